@@ -1,0 +1,1 @@
+"""The laboratory: plant, sensors, actuators, the loop and everything around a test."""

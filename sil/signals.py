@@ -1,0 +1,55 @@
+"""The few value types and protocols shared inside the laboratory: what flows between plant, sensors, actuators, loop.
+
+Frames: N inertial, O orbital (x along-track, y = -orbit normal, z nadir), B body. `q_BN` is scalar first and maps body
+to inertial components, v_N = q v_B q* (Hamilton). Arrays are float64 of the shape given; nobody writes into an array
+that was handed over.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from protocol.frames import Reading
+
+Vector = npt.NDArray[np.float64]
+
+
+class Motion(NamedTuple):
+    """The truth at one instant; `R` is the reference frame named by `attitude.frame` (lvlh: O, inertial: N)."""
+
+    t_ns: int
+    q_BN: Vector  # (4,) scalar first, continuous in sign
+    omega_BN_B: Vector  # (3,) rad/s, body axes
+    momentum_B: Vector  # (3,) N m s, absolute wheel momentum about the body axes
+    euler_rad: Vector  # (3,) rad, [x, y, z] angles of B relative to R in `attitude.sequence`
+    rate_rel: Vector  # (3,) rad/s, omega_BR_B: body rate relative to R, body axes
+
+
+class Plant(Protocol):
+    """The satellite. It knows no sample numbers: whoever calls it says from when to when."""
+
+    def motion(self, t_ns: int) -> Motion:
+        """Truth at t_ns, the instant the state has been integrated to. Fresh arrays every time."""
+
+    def advance(self, torque_B: Vector, t_ns: int, period_ns: int) -> None:
+        """Integrate from t_ns to t_ns + period_ns with `torque_B` (3,) N m on the body held constant."""
+
+
+class Actuator(Protocol):
+    """What stands between a commanded torque and the body."""
+
+    def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float) -> Vector:
+        """Torque (3,) N m that really acts on the body for the coming period, given the wheel momentum (3,) N m s."""
+
+
+class Sensor(Protocol):
+    """One instrument: truth in, integers in wire units out. The same (motion, tick) gives the same reading."""
+
+    bit: int  # which reading of a SAMPLE it fills: 0 Euler angles, 1 quaternion, 2 rates
+
+    def read(self, motion: Motion, tick: int) -> Reading:
+        """The reading that leaves at `tick`."""
