@@ -100,7 +100,7 @@ class Rigid:
         return Motion(t_ns, out[0:4], out[4:7], out[7:10], out[10:13], out[13:16])
 
     def advance(self, torque_B: Vector, t_ns: int, period_ns: int) -> None:
-        """From t_ns to t_ns + period_ns; `torque_B` (3,) N m acts on the body throughout, its negative on the wheels."""
+        """From t_ns to t_ns + period_ns; `torque_B` (3,) N m on the body throughout, its negative on the wheels."""
         period_s = period_ns * 1e-9
         steps = max(1, math.ceil(period_s / self._step_s * (1 - 1e-12)))
         _advance(self.state, torque_B, self._par, t_ns * 1e-9, period_s / steps, steps)

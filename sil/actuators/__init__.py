@@ -1,0 +1,5 @@
+"""What turns a command into a torque on the body: one file each, one line here."""
+
+ACTUATORS: dict[str, str] = {
+    "wheels": "sil.actuators.wheels:Wheels",
+}
