@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from protocol.frames import Reading
+    from protocol.frames import Reading, Sample
 
 Vector = npt.NDArray[np.float64]
 
@@ -53,3 +53,41 @@ class Sensor(Protocol):
 
     def read(self, motion: Motion, tick: int) -> Reading:
         """The reading that leaves at `tick`."""
+
+
+class Counterpart(Protocol):
+    """The other end of the cable as the loop sees it: a board, or nobody."""
+
+    def send(self, sample: Sample, t_ns: int) -> None:
+        """SAMPLE(k) leaves at t_k."""
+
+    def drain(self, tick: int) -> None:
+        """Take what has come; in lockstep wait until the whole answer to `tick` is here."""
+
+    def listen(self, timeout_s: float) -> None:
+        """Wait up to `timeout_s` for one frame and take it."""
+
+    def finish(self, tick: int) -> None:
+        """The run is over: the answer to `tick` is the last one that counts."""
+
+
+class Recorder(Protocol):
+    """Where a run's rows go. Nothing handed over here comes from a wall clock, except what its name says."""
+
+    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+        """A deterministic frame, header to CRC; direction and fate as in sil.sinks.journal."""
+
+    def housekeeping(self, tick: int, direction: int, packet: bytes) -> None:
+        """A frame outside every comparison; it is stamped with the host's time."""
+
+    def event(self, tick: int, code: int, a: int, b: int) -> None:
+        """Something the laboratory noticed; codes in protocol.events."""
+
+    def truth(self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int) -> None:
+        """The plant at t_k and the torque that acts from t_k on."""
+
+    def timing(self, tick: int, lateness_ns: int) -> None:
+        """How late the tick woke up on the wall clock."""
+
+    def commit(self, tick: int) -> None:
+        """Everything of this tick has been handed over: one write."""

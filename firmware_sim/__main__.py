@@ -1,0 +1,77 @@
+"""The controller process: python -m firmware_sim --link URL. Serves sessions until its link or its parent is gone."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import os
+import signal
+import sys
+
+PR_SET_PDEATHSIG = 1
+EXIT_LINK = 3
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Exit codes: 0 stopped by the laboratory or by a signal, 2 bad arguments or law, 3 link failure."""
+    options = _parser().parse_args(argv)
+    if options.parent:
+        _die_with(options.parent)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+
+    from firmware_sim.board import Board
+    from firmware_sim.controllers import LawFileError, load_user_law
+    from firmware_sim.hal import HostHal
+    from protocol.links import LinkClosed, LinkError, open_link
+    from protocol.port import Port
+
+    try:
+        user_law = load_user_law(options.law) if options.law else None
+        link = open_link(options.link, listen=True)
+    except LawFileError as error:
+        return _fail(str(error), 2)
+    except LinkError as error:
+        return _fail(str(error), EXIT_LINK)
+    print(f"listening {link.url}", flush=True)
+    port = Port(link)
+    try:
+        Board(port, HostHal(port), user_law).serve(once=options.once)
+    except LinkClosed as error:
+        return 0 if options.once else _fail(str(error), EXIT_LINK)
+    except KeyboardInterrupt:
+        return 0
+    finally:
+        port.close()
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="firmware_sim",
+        description="The controller of the testbed in its own process: fixed-point law, own timer, nothing of the plant.",
+        epilog="examples: --link serial:///dev/pts/7   --link udp://127.0.0.1:5005   --link udp://0.0.0.0:5005",
+    )
+    parser.add_argument("--link", required=True, metavar="URL", help="serial://PATH[?baud=N] or udp://HOST:PORT to listen on")
+    parser.add_argument("--law", metavar="FILE.py:CLASS", help="a law of your own, as the scenario names it")
+    parser.add_argument("--once", action="store_true", help="exit after the first session (default: serve until stopped)")
+    parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
+    return parser
+
+
+def _die_with(parent: int) -> None:
+    """The kernel kills this process with its parent, whatever killed that one (Linux; elsewhere the link's end does)."""
+    try:
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
+    except (OSError, AttributeError):
+        return
+    if os.getppid() != parent:
+        sys.exit(0)
+
+
+def _fail(line: str, code: int) -> int:
+    print(line, file=sys.stderr)
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())

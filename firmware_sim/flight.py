@@ -1,0 +1,224 @@
+"""One configured session on the board: what happens in one tick, from reading to COMMAND, TELEMETRY and EVENTs.
+
+Order within a tick: set-point -> what acts now -> reading -> reference model -> law -> limits and watchdog -> answer.
+All times are counted in simulated nanoseconds from tick numbers, so every clock gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from firmware_sim import controllers
+from firmware_sim.controllers import inputs
+from firmware_sim.guidance.reference import Reference
+from protocol import events, frames
+from protocol.frames import NO_TICK, Command, Event, Reading, Sample, Telemetry
+from protocol.law_tables import FORM_FLOAT, Configuration, LawTable, parse_configuration, refusal
+
+INT32_MAX = 2**31 - 1
+
+
+class FlightRefused(Exception):
+    """The law will not fly with this configuration; the sentence says why."""
+
+
+class Flight:
+    """The configured board. `words` are the CONFIG words; raises ConfigError (with the word's index) or FlightRefused."""
+
+    def __init__(self, words: Sequence[int], user_law: tuple[LawTable, type] | None = None) -> None:
+        configuration = parse_configuration(words, user_law[0] if user_law else None)
+        self.table_hash = configuration.hash
+        self._configuration = configuration
+        self._table = configuration.table
+        self._user_class = user_law[1] if user_law else None
+        common = configuration.common
+        self.period_ns = common["period_us"] * 1000
+        self.sample_timeout_ns = common["sample_timeout_us"] * 1000
+        self._answer_delay_ns = common["answer_delay_us"] * 1000
+        self._delay = common["transport_delay_ticks"]
+        self._link_limit = common["link_limit"]
+        self._telemetry_every = common["telemetry_every"]
+        self._needs = common["readings_mask"]
+        self._float = common["form"] == FORM_FLOAT
+        self._setpoint_from_sample = common["setpoint_source"] == 1
+        self._rows = configuration.rows
+        self._si = inputs.si_scale(common)
+        self._torque_unit = 2.0 ** -common["torque_bits"]
+        self._limits = tuple(common[f"torque_limit_{axis}"] for axis in "xyz")
+        reason = refusal(configuration)
+        if reason is not None:
+            raise FlightRefused(reason)
+        self._warm_up()
+        self._begin(0)
+
+    def _new_law(self, configuration: Configuration) -> controllers.Law:
+        if self._user_class is not None:
+            return controllers.user_law(self._user_class, configuration)
+        return controllers.new_law(self._table.name, configuration)
+
+    def _warm_up(self) -> None:
+        """Compile and allocate on a copy, so that the next SAMPLE is answered in time and the flight state is untouched."""
+        self._begin(0)
+        quaternion = Reading(0, (2**30, 0, 0, 0))
+        zero = (0, 0, 0)
+        readings = (Reading(0, zero), quaternion, Reading(0, zero))
+        for tick in range(3):
+            self.step(tick, Sample(tick, zero, zero, zero, NO_TICK, 0, frames.ZERO, 7, readings))
+        self.step(3, None)
+
+    def _begin(self, first_tick: int) -> None:
+        """Fresh law, reference and counters; what a start and a bumpless re-start have in common."""
+        common = self._configuration.common
+        self._law = self._new_law(self._configuration)
+        self._reference = Reference(common, self._float)
+        dtype = np.float64 if self._float else np.int64
+        self._inp = np.zeros(inputs.SIZE, dtype)
+        self._wire = np.zeros(inputs.SIZE, np.int64)
+        self._out = np.zeros(4, dtype)
+        self._sent: list[tuple[int, int, int]] = [(0, 0, 0)] * (self._delay + 1)  # newest last
+        self._row = 0
+        self._setpoint = (0, 0, 0)
+        self._good_run = 0
+        self._since_sample = 0
+        self._watchdog = False
+        self._free_at_ns = 0
+        self._first_tick = first_tick
+        self._lost = self._overruns = self._dropped = self._saturations = 0
+        self._pending: list[Event] = []
+
+    # -- what the main loop calls --------------------------------------------------------------------------------
+
+    def count_dropped(self, tick: int) -> None:
+        """A SAMPLE for a tick that was already stepped."""
+        self._dropped += 1
+        self._pending.append(Event(tick, events.STALE_SAMPLE, tick & 0x7FFFFFFF, self._dropped))
+
+    def restart(self, expected: int, tick: int) -> None:
+        """Bumpless re-start: the gap is too long to propagate; law and reference begin anew at the next reading."""
+        counters = (self._lost, self._overruns, self._dropped, self._saturations)
+        self._begin(tick)
+        self._lost, self._overruns, self._dropped, self._saturations = counters
+        self._restarted = True
+        self._pending.append(Event(tick, events.RESTARTED, expected, tick))
+
+    _restarted = False
+
+    def step(self, tick: int, sample: Sample | None) -> list[Command | Telemetry | Event]:
+        """One tick, exactly once. Returns the answer: COMMAND, TELEMETRY if due, EVENTs, in wire order."""
+        notices = [event._replace(tick=tick) for event in self._pending]
+        self._pending = []
+        usable, overrun = self._admit(tick, sample)
+        self._take_setpoint(tick, sample)
+        self._fill(tick, sample if usable else None)
+        torque, flags = self._control(tick, notices)
+        flags |= self._watch(tick, sample is not None, notices)
+        if flags & frames.FLAG_WATCHDOG:
+            torque = (0, 0, 0)
+        if overrun:
+            flags |= frames.FLAG_OVERRUN
+            notices.append(Event(tick, events.OVERRUN, tick, self._overruns))
+        if not usable:
+            notices.append(Event(tick, events.SAMPLE_LOST, tick, self._lost))
+        self._sent = [*self._sent[1:], torque]
+        return self._answer(tick, torque, flags, usable, notices)
+
+    # -- one tick, in order --------------------------------------------------------------------------------------
+
+    def _admit(self, tick: int, sample: Sample | None) -> tuple[bool, bool]:
+        """Execution model and validity: (the sample is used, it was an overrun).
+
+        start = max(arrival, free_at); free_at = start + answer_delay; a SAMPLE that arrives before free_at finds the
+        one-deep mailbox taken.
+        """
+        start_ns = tick * self.period_ns
+        start_ns += self.sample_timeout_ns if sample is None else sample.transit_us * 1000
+        overrun = sample is not None and start_ns < self._free_at_ns
+        self._free_at_ns = max(start_ns, self._free_at_ns) + self._answer_delay_ns
+        usable = sample is not None and not overrun and (sample.valid & self._needs) == self._needs
+        self._good_run = self._good_run + 1 if usable else 0
+        self._lost += not usable
+        self._overruns += overrun
+        return usable, overrun
+
+    def _take_setpoint(self, tick: int, sample: Sample | None) -> None:
+        """The table's row that holds at `tick`; or, when CONFIG says so, SAMPLE's set-point, kept while none comes."""
+        if self._setpoint_from_sample:
+            if sample is not None:
+                self._setpoint = sample.setpoint
+            return
+        while self._row < len(self._rows) and self._rows[self._row][0] <= tick:
+            self._setpoint = self._rows[self._row][1:]
+            self._row += 1
+
+    def _fill(self, tick: int, sample: Sample | None) -> None:
+        """The law's inputs in wire units; what acts now is the lab's word, or without it the board's own last command."""
+        wire = self._wire
+        wire[inputs.FRESH] = sample is not None
+        wire[inputs.GOOD_RUN] = self._good_run
+        wire[inputs.APPLIED_KNOWN] = sample is not None
+        wire[inputs.TICK] = tick
+        wire[inputs.SETPOINT] = self._setpoint
+        if sample is None:
+            wire[inputs.APPLIED] = self._sent[-self._delay] if self._delay else self._sent[-1]
+        else:
+            wire[inputs.APPLIED] = sample.applied
+            wire[inputs.MOMENTUM] = sample.momentum
+            for place, reading in zip(inputs.READINGS, sample.readings, strict=True):
+                if reading is not None:
+                    wire[place] = reading.values
+        if self._float:
+            np.multiply(wire, self._si, out=self._inp)
+        else:
+            self._inp[:] = wire
+
+    def _control(self, tick: int, notices: list[Event]) -> tuple[tuple[int, int, int], int]:
+        """Reference model, then law, then the wire's own limits."""
+        restarted = self._reference.advance(self._inp)
+        self._law.step(self._inp, self._reference.state, self._out)
+        if restarted or self._law.reference_restarted:
+            notices.append(Event(tick, events.REFERENCE_RESTART, 7, int(restarted)))
+        flags = int(self._out[3])
+        torque = self._to_wire(self._out, notices, tick) if self._float else tuple(self._out[:3].tolist())
+        limited = tuple(max(-m, min(m, u)) for u, m in zip(torque, self._limits, strict=True))
+        if limited != torque:
+            flags |= frames.FLAG_SATURATED
+        self._saturations += bool(flags & frames.FLAG_SATURATED)
+        return limited, flags  # type: ignore[return-value]
+
+    def _to_wire(self, out: np.ndarray, notices: list[Event], tick: int) -> tuple[int, int, int]:
+        values = []
+        for axis, u in enumerate(out[:3].tolist()):
+            if u != u:
+                notices.append(Event(tick, events.NAN, axis, 0))
+                u = 0.0
+            scaled = u / self._torque_unit
+            values.append(round(max(-INT32_MAX, min(INT32_MAX, scaled))))
+        return values[0], values[1], values[2]
+
+    def _watch(self, tick: int, heard: bool, notices: list[Event]) -> int:
+        """Link watchdog: after link_limit ticks without a SAMPLE the command is zero, until the next SAMPLE."""
+        self._since_sample = 0 if heard else self._since_sample + 1
+        tripped = self._since_sample >= self._link_limit
+        if tripped != self._watchdog:
+            code = events.WATCHDOG_ON if tripped else events.WATCHDOG_OFF
+            notices.append(Event(tick, code, tick, self._since_sample))
+            self._watchdog = tripped
+        return frames.FLAG_WATCHDOG if tripped else 0
+
+    def _answer(
+        self, tick: int, torque: tuple[int, int, int], flags: int, usable: bool, notices: list[Event]
+    ) -> list[Command | Telemetry | Event]:
+        used = frames.USED if usable else frames.PROPAGATED if self._law.has_model else frames.REPEATED
+        if self._restarted:
+            used, self._restarted = frames.RESTARTED, False
+        due = self._telemetry_every > 0 and tick % self._telemetry_every == 0
+        answer: list[Command | Telemetry | Event] = [Command(tick, torque, flags, due + len(notices), used)]
+        if due:
+            answer.append(Telemetry(tick, self._table.law_id, self._table.version, self._telemetry()))
+        return answer + notices
+
+    def _telemetry(self) -> tuple[int, ...]:
+        counters = (self._lost, self._overruns, self._dropped, self._saturations)
+        return (*self._reference.words(), *self._setpoint, *counters, *self._law.telemetry())

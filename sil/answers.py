@@ -1,0 +1,150 @@
+"""What the laboratory knows of the board while a run goes on: samples sent, answers received, what is missing.
+
+A tick's answer is COMMAND(k) and the TELEMETRY and EVENT frames it announces. In lockstep `drain` waits for the whole
+answer; in real time it takes what is there. The modelled arrival alone decides whether a command is in time.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from protocol import frames
+from protocol.channel import TO_BOARD, TO_LAB, Channel, Fate
+from protocol.frames import Command, Packet, Sample, Tick, Type
+from protocol.port import Port
+from sil.commands import CommandWindow, ExecutionModel
+from sil.signals import Recorder
+from sil.sinks.journal import Direction
+from sil.sinks.journal import Fate as Outcome
+from sil.trouble import LinkFailure
+
+ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
+LOOK_EVERY_S = 0.25
+REMEMBERED_TICKS = 256
+
+
+class Answers:
+    """The board as the loop sees it. `check_alive()` raises LinkFailure when the board's process is gone."""
+
+    def __init__(
+        self,
+        port: Port,
+        channel: Channel,
+        model: ExecutionModel,
+        window: CommandWindow,
+        recorder: Recorder,
+        torque_Nm: float,
+        lockstep: bool,
+        check_alive: Callable[[], None],
+        dead_after_s: float,
+    ) -> None:
+        self._port, self._channel, self._model, self._window = port, channel, model, window
+        self._recorder, self._torque_Nm, self._lockstep = recorder, torque_Nm, lockstep
+        self._check_alive, self._dead_after_s = check_alive, dead_after_s
+        self._tick = -1  # newest tick a SAMPLE was sent for
+        self._complete = -1  # newest tick whose whole answer is here
+        self._followers = 0  # frames still to come of the answer under way
+        self._done_ns: dict[int, int] = {}
+        self._sent_wall_ns = 0
+        self._heard_wall_ns = time.monotonic_ns()
+        self.answer_ns: list[int] = []
+        self.duplicates = 0
+        self.overruns = 0
+        self._sample_size = 0  # bytes on the wire
+
+    # -- up ------------------------------------------------------------------------------------------------------
+
+    def send(self, sample: Sample, t_ns: int) -> None:
+        """SAMPLE(k), or in lockstep TICK(k) where the link does not deliver it (TICK is never faulted)."""
+        tick = self._tick = sample.tick
+        if not self._sample_size:
+            self._sample_size = len(frames.pack(sample, 0)) + ENCODED_EXTRA
+        fate = self._channel.fate(TO_BOARD, tick, Type.SAMPLE, 0, self._sample_size, t_ns)
+        transit_us = (fate.arrival_ns - t_ns) // 1000
+        packet = self._port.pack(sample._replace(transit_us=transit_us))
+        self._sent_wall_ns = time.monotonic_ns()
+        if fate.delivered:
+            self._port.write(packet)
+        elif self._lockstep:
+            self._port.send(Tick(tick))
+        self._recorder.packet(tick, Direction.UP, Outcome.DELIVERED if fate.delivered else Outcome.DROPPED, packet)
+        self._done_ns[tick] = self._model.done_ns(tick, transit_us * 1000 if fate.delivered else None)
+        self._done_ns.pop(tick - REMEMBERED_TICKS, None)
+
+    # -- down ----------------------------------------------------------------------------------------------------
+
+    def drain(self, tick: int) -> None:
+        """Lockstep: wait until the whole answer to `tick` is here. Real time: take what has come by now."""
+        if not self._lockstep:
+            while (packet := self._port.receive(0.0)) is not None:
+                self._take(packet)
+            self._watch_silence()
+            return
+        while self._complete < tick or self._followers:
+            packet = self._port.receive(LOOK_EVERY_S)
+            if packet is not None:
+                self._take(packet)
+            else:
+                self._watch_silence()
+
+    def listen(self, timeout_s: float) -> None:
+        """Wait up to `timeout_s` for a frame and take it; what a paced clock does between ticks."""
+        packet = self._port.receive(timeout_s)
+        if packet is not None:
+            self._take(packet)
+
+    def finish(self, tick: int) -> None:
+        """The last answer; one that the clock has not brought by now counts like any real miss."""
+        self.drain(tick)
+        if self._complete < tick:
+            self._window.unanswered(tick)
+
+    def _watch_silence(self) -> None:
+        """Wall limits only detect a dead peer; they never decide a byte."""
+        silent_s = (time.monotonic_ns() - self._heard_wall_ns) * 1e-9
+        if silent_s < LOOK_EVERY_S:
+            return
+        self._check_alive()
+        if self._complete < self._tick and silent_s > self._dead_after_s:
+            raise LinkFailure(f"board: no answer to tick {self._complete + 1} within {self._dead_after_s:g} s")
+
+    def _take(self, packet: Packet) -> None:
+        self._heard_wall_ns = time.monotonic_ns()
+        kind = packet.type
+        if kind == Type.COMMAND:
+            self._command(packet)
+        elif kind in (Type.TELEMETRY, Type.EVENT):
+            self._follower(packet)
+        elif kind == Type.HELLO and not packet.frame.flags & frames.HELLO_ECHO:
+            raise LinkFailure(f"board: restarted after tick {self._complete} (it says HELLO unasked)")
+        else:
+            self._recorder.housekeeping(self._tick, Direction.DOWN, packet.raw)
+
+    def _command(self, packet: Packet) -> None:
+        command: Command = packet.frame
+        tick = command.tick
+        if tick <= self._complete or tick not in self._done_ns:
+            self.duplicates += 1
+            return
+        self._complete, self._followers = tick, command.follows
+        if tick == self._tick:
+            self.answer_ns.append(self._heard_wall_ns - self._sent_wall_ns)
+        x, y, z = command.torque
+        unit = self._torque_Nm
+        fate = self._fate(packet)
+        if not fate.delivered:
+            self._window.lost(tick)
+            self._recorder.packet(tick, Direction.DOWN, Outcome.DROPPED, packet.raw)
+            return
+        in_time = self._window.arrive(tick, (x * unit, y * unit, z * unit), fate.arrival_ns)
+        self._recorder.packet(tick, Direction.DOWN, Outcome.DELIVERED if in_time else Outcome.LATE, packet.raw)
+
+    def _follower(self, packet: Packet) -> None:
+        self._followers = max(0, self._followers - 1)
+        delivered = self._fate(packet).delivered
+        self._recorder.packet(packet.tick, Direction.DOWN, Outcome.DELIVERED if delivered else Outcome.DROPPED, packet.raw)
+
+    def _fate(self, packet: Packet) -> Fate:
+        sent_ns = self._done_ns.get(packet.tick, 0)
+        return self._channel.fate(TO_LAB, packet.tick, packet.type, 0, len(packet.raw) + ENCODED_EXTRA, sent_ns)

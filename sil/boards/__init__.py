@@ -1,0 +1,45 @@
+"""Boards: what is plugged into the other end of the cable. One file per kind, one line here; imported when named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from protocol.links import Link
+from sil.plugins import load
+
+BOARDS = {
+    "process": "sil.boards.process:ProcessBoard",
+    "inproc": "sil.boards.inproc:InprocBoard",
+    "wired": "sil.boards.wired:WiredBoard",
+}
+
+
+@dataclass(frozen=True)
+class BoardOrder:
+    """What a run asks of a board. `law_file`: `/abs/file.py:Class` of a user's law, or "". `log`: its stderr goes there."""
+
+    link_url: str
+    law_file: str
+    log: Path | None
+    notify: Callable[[str], None]
+
+
+class BoardHost(Protocol):
+    """A board that is plugged in: the lab's end of its link, and a way to see whether it lives."""
+
+    link: Link
+
+    def check_alive(self) -> None:
+        """Raises LinkFailure when the board is known to be gone; silence is the caller's to judge."""
+
+    def close(self) -> None:
+        """Unplug, and leave no process behind. Safe to call twice."""
+
+
+def plug_in(kind: str, order: BoardOrder) -> BoardHost:
+    """Start or find the board. Raises LinkFailure, LinkError."""
+    board: BoardHost = load(BOARDS, "board", kind)(order)
+    return board

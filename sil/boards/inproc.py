@@ -1,0 +1,37 @@
+"""The board inside the laboratory's process, through frames all the same. The one file of `sil` that imports firmware_sim."""
+
+from __future__ import annotations
+
+from firmware_sim.board import Board
+from firmware_sim.controllers import LawFileError, load_user_law
+from firmware_sim.hal import HostHal
+from protocol.links import Link, inproc
+from protocol.port import Port
+from sil.boards import BoardOrder
+from sil.trouble import UsageError
+
+
+class InprocBoard:
+    """A `firmware_sim` board that runs until idle whenever the laboratory waits for a frame. Lockstep only."""
+
+    def __init__(self, order: BoardOrder) -> None:
+        try:
+            user_law = load_user_law(order.law_file) if order.law_file else None
+        except LawFileError as error:
+            raise UsageError(str(error)) from None
+        lab_end, board_end = inproc.pair()
+        self.link: Link = lab_end
+        self._port = Port(board_end)
+        self._board = Board(self._port, HostHal(self._port), user_law)
+        lab_end.pump = self._run_until_idle
+
+    def check_alive(self) -> None:
+        """It lives as long as this process does."""
+
+    def close(self) -> None:
+        self.link.close()
+        self._port.close()
+
+    def _run_until_idle(self) -> None:
+        while (packet := self._port.receive(0.0)) is not None:
+            self._board.handle(packet)

@@ -1,0 +1,21 @@
+"""A board that somebody else powers: real hardware on a serial port, or a controller started by hand."""
+
+from __future__ import annotations
+
+from protocol.links import Link, open_link
+from sil.boards import BoardOrder
+
+
+class WiredBoard:
+    """Opens the lab's end of the link and waits; on a pty it says which device the board has to open."""
+
+    def __init__(self, order: BoardOrder) -> None:
+        self.link: Link = open_link(order.link_url, listen=False)
+        if order.link_url.startswith("pty"):
+            order.notify(f"waiting for a board on {self.link.peer_url}   (sil board --link {self.link.peer_url})")
+
+    def check_alive(self) -> None:
+        """Nothing of ours to look after: only its silence tells."""
+
+    def close(self) -> None:
+        self.link.close()

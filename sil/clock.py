@@ -1,0 +1,94 @@
+"""When a tick happens on the wall: lockstep (as fast as answers come), realtime, scaled:N. Real time is scale 1.
+
+A paced clock wakes at absolute deadlines of CLOCK_MONOTONIC, epoch + t_k / scale, so lateness never accumulates.
+A tick that wakes more than a period late re-bases the epoch: ticks are neither skipped nor burst.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+POLL_MARGIN_NS = 2_000_000  # poll() has millisecond grain: the last stretch is slept to the absolute deadline
+PR_SET_TIMERSLACK = 29
+
+
+class Clock(Protocol):
+    """What the loop needs of time. `paced` is False where answers alone set the speed."""
+
+    paced: bool
+    scale: float
+
+    def start(self, first_tick_ns: int) -> None:
+        """Tick 0 (simulated time `first_tick_ns`) is now."""
+
+    def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
+        """Sleep until simulated time `t_ns`, calling `listen(timeout_s)` for frames meanwhile; returns lateness in ns."""
+
+    def rebase(self, t_ns: int) -> None:
+        """Simulated time `t_ns` is now: what was missed stays missed."""
+
+
+class Lockstep:
+    """No waiting: the plant goes on as soon as the board has answered."""
+
+    paced = False
+    scale = 0.0
+
+    def start(self, first_tick_ns: int) -> None:
+        pass
+
+    def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
+        return 0
+
+    def rebase(self, t_ns: int) -> None:
+        pass
+
+
+class Scaled:
+    """`scale` simulated seconds per wall second; 1 is real time."""
+
+    paced = True
+
+    def __init__(self, scale: float, now: Callable[[], int] = time.monotonic_ns) -> None:
+        self.scale = scale
+        self._now = now
+        self._epoch_ns = 0
+        _set_timer_slack()
+
+    def start(self, first_tick_ns: int) -> None:
+        self.rebase(first_tick_ns)
+
+    def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
+        deadline = self._epoch_ns + int(t_ns / self.scale)
+        while (left := deadline - self._now()) > 0:
+            if left > 2 * POLL_MARGIN_NS:
+                listen((left - POLL_MARGIN_NS) * 1e-9)
+            else:
+                time.sleep(left * 1e-9)
+        return self._now() - deadline
+
+    def rebase(self, t_ns: int) -> None:
+        self._epoch_ns = self._now() - int(t_ns / self.scale)
+
+
+def new_clock(name: str) -> Clock:
+    """`lockstep`, `realtime` or `scaled:N` (the scenario has checked the name)."""
+    if name == "lockstep":
+        return Lockstep()
+    return Scaled(1.0 if name == "realtime" else float(name.partition(":")[2]))
+
+
+def clock_rate_q16(clock: Clock) -> int:
+    """HELLO's clock rate: simulated seconds per wall second in Q16; 0 switches the board's own timer off."""
+    return min(round(clock.scale * 65536), 0xFFFFFFFF) if clock.paced else 0
+
+
+def _set_timer_slack() -> None:
+    """1 ns instead of Linux's 50 us of permitted lateness; unprivileged, and no matter where it is refused."""
+    try:
+        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+    except (OSError, AttributeError):
+        return

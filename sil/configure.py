@@ -1,0 +1,92 @@
+"""Scenario to CONFIG: what the board is told before a run, as the int32 words of protocol/law_tables.py.
+
+The lab resolves what needs a transcendental function or a name (poles, profiles, limits); the board gets integers.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from typing import NamedTuple
+
+from protocol import law_tables
+from protocol.law_tables import Configuration, LawTable
+from sil.profiles import setpoint_rows
+from sil.scenario import Scenario
+
+TURN_BAM = 2**32
+FULL_SCALE = 2**31 - 1
+
+Row = tuple[int, int, int, int]  # tick, x, y, z in 2^-32 turn
+
+
+class Orders(NamedTuple):
+    """Everything the board is told: CONFIG words, and what both ends read out of them."""
+
+    table: LawTable
+    words: tuple[int, ...]
+    configuration: Configuration
+
+    def setpoint(self, tick: int) -> tuple[int, int, int]:
+        """r(k) in 2^-32 turn: the last row at or before `tick`; zero before the first."""
+        return row_at(self.configuration.rows, tick)
+
+
+def row_at(rows: tuple[Row, ...], tick: int) -> tuple[int, int, int]:
+    """The x, y, z of the last row at or before `tick`; zero before the first."""
+    place = bisect_right(rows, tick, key=lambda row: row[0])
+    return rows[place - 1][1:] if place else (0, 0, 0)
+
+
+def orders(scenario: Scenario, table: LawTable) -> Orders:
+    """CONFIG of a scenario. Raises ConfigError where a value does not fit its word."""
+    period_s = scenario.period_s
+    guidance, wire = scenario.guidance, scenario.wire
+    limits = scenario.actuators.wheels.torque_max_Nm
+    values: dict[str, law_tables.Value] = {
+        "form": scenario.law.form,
+        "period_us": round(period_s * 1e6),
+        "transport_delay_ticks": scenario.transport_delay_ticks,
+        "hold_limit": scenario.hold_limit,
+        "link_limit": scenario.link_limit,
+        "sample_timeout_us": round(scenario.sample_timeout_seconds * 1e6),
+        "answer_delay_us": round(scenario.answer_delay_s * 1e6),
+        "telemetry_every": scenario.telemetry_every,
+        "torque_bits": torque_bits(scenario),
+        "momentum_bits": wire.momentum_bits,
+        "rate_bits": wire.rate_bits,
+        "torque_limit": tuple(math.inf if limit is None else limit for limit in limits),
+        "reference_kind": guidance.reference,
+        "reference_pole": math.exp(-guidance.wn_radps * period_s),
+        "rate_limit": _bam(guidance.rate_limit_degps or 0.0, period_s),
+        "accel_limit": _bam(guidance.accel_limit_degps2 or 0.0, period_s**2),
+        "setpoint_source": guidance.setpoint_source,
+        **scenario.law.params,
+    }
+    rows = guidance_rows(scenario) if guidance.setpoint_source == "table" else ()
+    words = law_tables.config_words(table, values, rows)
+    return Orders(table, words, law_tables.parse_configuration(words, table))
+
+
+def guidance_rows(scenario: Scenario) -> tuple[Row, ...]:
+    """The named profile as (tick, x, y, z) in 2^-32 turn."""
+    return tuple(
+        (tick, *(_bam(angle, 1.0) for angle in attitude_deg)) for tick, attitude_deg in setpoint_rows(scenario)
+    )  # type: ignore[return-value]
+
+
+def torque_bits(scenario: Scenario) -> int:
+    """Fractional bits of a torque: as many as let the limit fit int32 (at most 30); 20 (+-2048 N m) without a limit."""
+    if scenario.wire.torque_bits is not None:
+        return scenario.wire.torque_bits
+    limits = scenario.actuators.wheels.torque_max_Nm
+    if None in limits:
+        return 20
+    largest = max(limit for limit in limits if limit is not None)
+    return min(30, math.floor(math.log2(FULL_SCALE / largest)))
+
+
+def _bam(angle_deg: float, factor: float) -> int:
+    """`angle_deg` * factor in 2^-32 turn, wrapped to int32."""
+    counts = round(angle_deg / 360.0 * factor * TURN_BAM)
+    return (counts + TURN_BAM // 2) % TURN_BAM - TURN_BAM // 2

@@ -1,0 +1,132 @@
+""">>> READ FIRST: one tick of the laboratory, in order. The transport delay is one variable, `delay`, written once.
+
+    t_k        drain the link -> decide what acts -> read the sensors -> send SAMPLE(k) -> integrate to t_k+1 -> record
+    the board  ... computes COMMAND(k) meanwhile; it acts from t_(k+delay) on
+
+Nothing here reads a wall clock: the `Clock` says when a tick happens, tick numbers say everything else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from protocol.frames import Reading, Sample
+from sil.clock import Clock
+from sil.commands import Acting, Decides
+from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
+
+
+class Timing(NamedTuple):
+    """The integers one run's loop counts in."""
+
+    period_ns: int
+    delay: int  # transport_delay_ticks n: COMMAND(j) acts from t_(j+n) on
+    ticks: int
+    first_tick: int = 0
+
+
+class Scales(NamedTuple):
+    """Values of one least significant bit on the wire."""
+
+    torque_Nm: float
+    momentum_Nms: float
+
+
+class Loop:
+    """Plant, sensors and actuators on one side of the cable, the board on the other; `rig.py` plugs them together."""
+
+    def __init__(
+        self,
+        timing: Timing,
+        scales: Scales,
+        plant: Plant,
+        actuator: Actuator,
+        sensors: Sequence[Sensor],
+        setpoints: Callable[[int], tuple[int, int, int]],
+        board: Counterpart,
+        commands: Decides,
+        recorder: Recorder,
+        clock: Clock,
+    ) -> None:
+        self.timing, self.scales = timing, scales
+        self.plant, self.actuator, self.sensors, self.setpoints = plant, actuator, sensors, setpoints
+        self.board, self.commands, self.recorder, self.clock = board, commands, recorder, clock
+        self.period_s = timing.period_ns * 1e-9
+        self.degraded_ticks = 0
+        self.lateness_ns: list[int] = []
+
+    def tick(self, k: int) -> Motion:
+        """One tick. With delay 0 (lockstep only) the plant waits for COMMAND(k) before it integrates."""
+        delay, t_ns = self.timing.delay, k * self.timing.period_ns
+        self.board.drain(k - 1)  # (1)
+        acting = self.commands.decide(k - delay) if delay else self.commands.acting  # (2)
+        motion = self.plant.motion(t_ns)
+        applied = self._limited(acting, motion)
+        self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
+        if not delay:
+            self.board.drain(k)
+            applied = self._limited(self.commands.decide(k), motion)
+        self.plant.advance(applied, t_ns, self.timing.period_ns)  # (5)
+        self._record(k, motion, applied)  # (6)
+        return motion
+
+    def run(self, stop: Callable[[], bool], progress: Callable[[int, Motion], None]) -> tuple[int, str]:
+        """All ticks; returns (ticks done, reason): `finished`, or `interrupted` when `stop()` said so."""
+        first = self.timing.first_tick
+        self.clock.start(first * self.timing.period_ns)
+        for k in range(first, self.timing.ticks):
+            if stop():
+                return k, "interrupted"
+            self._await_tick(k)
+            motion = self.tick(k)
+            progress(k, motion)
+            if not np.isfinite(motion.euler_rad.sum()):
+                return k + 1, "diverged"
+        self._await_tick(self.timing.ticks)
+        self.board.finish(self.timing.ticks - 1)
+        self.recorder.commit(self.timing.ticks - 1)
+        return self.timing.ticks, "finished"
+
+    def _await_tick(self, k: int) -> None:
+        """Sleep to the deadline; a wake-up more than a period late moves the epoch, so ticks are never burst."""
+        if not self.clock.paced:
+            return
+        t_ns = k * self.timing.period_ns
+        late_ns = self.clock.wait(t_ns, self.board.listen)
+        self.lateness_ns.append(late_ns)
+        if late_ns > self.timing.period_ns / self.clock.scale:
+            self.degraded_ticks += 1
+            self.clock.rebase(t_ns)
+
+    def _limited(self, acting: Acting, motion: Motion) -> Vector:
+        command_Nm = np.array(acting.torque_Nm)
+        return self.actuator.limit(command_Nm, motion.momentum_B, self.period_s)
+
+    def _sample(self, k: int, motion: Motion, acting: Acting, applied: Vector) -> Sample:
+        """What the board is told: readings, set-point, and what is really applied now."""
+        readings: list[Reading | None] = [None, None, None]
+        valid = 0
+        for sensor in self.sensors:
+            readings[sensor.bit] = sensor.read(motion, k)
+            valid |= 1 << sensor.bit
+        torque = to_lsb(applied, self.scales.torque_Nm)
+        momentum = to_lsb(motion.momentum_B, self.scales.momentum_Nms)
+        setpoint = self.setpoints(k)
+        return Sample(k, setpoint, torque, momentum, acting.ack, 0, acting.source, valid, tuple(readings))
+
+    def _record(self, k: int, motion: Motion, applied: Vector) -> None:
+        for code, a, b in self.commands.notices:
+            self.recorder.event(k, code, a, b)
+        self.commands.notices.clear()
+        self.recorder.truth(k, motion, applied, self.commands.acting)
+        self.recorder.commit(k)
+
+
+def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:
+    """(3,) SI values to wire integers, rounded half to even, clipped to int32 (a diverging run must not stop the wire)."""
+    scaled = np.rint(values / unit).clip(-(2**31) + 1, 2**31 - 1)
+    x, y, z = scaled.astype(np.int64).tolist()
+    return x, y, z

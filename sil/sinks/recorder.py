@@ -1,0 +1,56 @@
+"""The run's recorder: rows of the loop into the journal, one write per tick. A listener, never asked for an answer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from sil.signals import Motion, Vector
+from sil.sinks import journal
+from sil.sinks.journal import Journal, Kind
+
+
+class JournalRecorder:
+    """Writes to an open Journal; JournalError (disk full) reaches the loop, which ends the run with what is kept."""
+
+    def __init__(self, target: Journal) -> None:
+        self._journal = target
+
+    def start(self, meta: Mapping[str, Any], host: Mapping[str, Any]) -> None:
+        """What decides the numbers, and apart from it what describes this machine and link."""
+        self._journal.add(Kind.META, 0, journal.json_payload(meta))
+        self._journal.add(Kind.HOST, 0, journal.json_payload(host))
+
+    def session(self, tick: int) -> None:
+        """A board session started at this tick; its CONFIG packets follow."""
+        self._journal.add(Kind.SESSION, tick, journal.json_payload({"tick": tick}))
+
+    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+        self._journal.add(Kind.PACKET, tick, journal.packet_payload(direction, fate, packet))
+
+    def housekeeping(self, tick: int, direction: int, packet: bytes) -> None:
+        payload = journal.housekeeping_payload(direction, time.monotonic_ns(), packet)
+        self._journal.add(Kind.HOUSEKEEPING, max(tick, 0), payload)
+
+    def event(self, tick: int, code: int, a: int, b: int) -> None:
+        self._journal.add(Kind.LAB_EVENT, tick, journal.event_payload(code, a, b))
+
+    def truth(
+        self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int
+    ) -> None:
+        rows = (motion.q_BN, motion.omega_BN_B, motion.momentum_B, motion.euler_rad, applied_Nm)
+        lists = [row.tolist() for row in rows]
+        self._journal.add(Kind.TRUTH, tick, journal.truth_payload(*lists, setpoint_bam, source))
+
+    def timing(self, tick: int, lateness_ns: int) -> None:
+        self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns))
+
+    def commit(self, tick: int) -> None:
+        self._journal.commit(tick)
+
+    def end(self, tick: int, reason: str, ticks: int) -> None:
+        """The last record: why the run ended, and after how many ticks."""
+        self._journal.add(Kind.END, tick, journal.json_payload({"reason": reason, "ticks": ticks}))
+        self._journal.commit(tick)
+        self._journal.close()
