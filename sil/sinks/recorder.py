@@ -40,8 +40,8 @@ class JournalRecorder:
         self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int
     ) -> None:
         rows = (motion.q_BN, motion.omega_BN_B, motion.momentum_B, motion.euler_rad, applied_Nm)
-        lists = [row.tolist() for row in rows]
-        self._journal.add(Kind.TRUTH, tick, journal.truth_payload(*lists, setpoint_bam, source))
+        q, w, h, euler, applied = (row.tolist() for row in rows)
+        self._journal.add(Kind.TRUTH, tick, journal.truth_payload(q, w, h, euler, applied, setpoint_bam, source))
 
     def timing(self, tick: int, lateness_ns: int) -> None:
         self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns))

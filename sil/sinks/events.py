@@ -1,0 +1,34 @@
+"""Events in words: the level and the line for /log. Codes and the meaning of a and b are protocol.events'."""
+
+from __future__ import annotations
+
+from protocol import events
+from protocol.events import EVENTS
+
+ERRORS = frozenset((events.NAN, events.LAW_ERROR, events.PLANT_NAN, events.DIVERGED, events.BOARD_RESTARTED))
+NOTES = frozenset(
+    (
+        events.WATCHDOG_OFF,
+        events.REFERENCE_RESTART,
+        events.IDENTIFICATION_PAUSED,
+        events.IDENTIFICATION_RESUMED,
+        events.RECOVERED,
+    )
+)
+OF_THE_HOST = frozenset((events.EPOCH_REBASED,))  # caused by this machine's clock alone: they go to timing.mcap
+
+
+def level_of(code: int) -> str:
+    """`error`, `warning` or `info`."""
+    if code in ERRORS:
+        return "error"
+    return "info" if code in NOTES else "warning"
+
+
+def describe(code: int, a: int, b: int) -> tuple[str, str]:
+    """(level, one line): the code's name, what it means, and its two numbers with their meaning."""
+    kind = EVENTS.get(code)
+    if kind is None:
+        return "warning", f"unknown event code 0x{code:04X} (a {a}, b {b})"
+    numbers = ", ".join(f"{meaning} {value}" for meaning, value in ((kind.a, a), (kind.b, b)) if meaning)
+    return level_of(code), f"{kind.name}: {kind.about}" + (f" ({numbers})" if numbers else "")

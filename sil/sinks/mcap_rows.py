@@ -1,0 +1,214 @@
+"""Journal records to MCAP messages: the rows of run.mcap (RunRows) and of timing.mcap (TimingRows)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from mcap.writer import Writer
+
+from protocol import frames
+from protocol.frames import Type
+from sil.sinks import events, layouts, viewer
+from sil.sinks import journal as jn
+from sil.sinks.decoding import DEG_PER_BAM, Decoder
+from sil.sinks.journal import Direction, Kind, PacketRecord, Record
+
+_DEG = 180.0 / math.pi
+_TYPE_AT, _SEQUENCE_AT, _TICK_AT = 1, slice(2, 4), slice(4, 8)
+_FIXED_TOPICS = (
+    ("/session", layouts.SESSION),
+    ("/packet/up", layouts.PACKET),
+    ("/packet/down", layouts.PACKET),
+    ("/sample", layouts.SAMPLE),
+    ("/command", layouts.COMMAND),
+    ("/truth", layouts.TRUTH),
+    ("/event", layouts.EVENT),
+)
+
+
+class RunRows:
+    """Writes the rows of run.mcap, one tick at a time. Every channel has a schema."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._decoder = Decoder()
+        self._transforms = viewer.Transforms()
+        self._channels = _register(writer, _FIXED_TOPICS)
+        for topic, (name, descriptors) in viewer.schemas().items():
+            schema = writer.register_schema(name, viewer.SCHEMA_ENCODING, descriptors)
+            self._channels[topic] = writer.register_channel(topic, viewer.ENCODING, schema)
+        self._scene_sent = False
+        self._sessions = 0
+        self.messages = 0
+        self.undecoded = 0
+
+    # -- identity ------------------------------------------------------------------------------------------------
+
+    def meta(self, content: Mapping[str, Any]) -> None:
+        """META: metadata `run`, and the resolved scenario as an attachment."""
+        rest = {key: value for key, value in content.items() if key != "scenario"}
+        self._decoder.describe(content)
+        self._writer.add_metadata("run", _texts(rest))
+        if "scenario" in content:
+            text = json.dumps(content["scenario"], indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+            self._writer.add_attachment(0, 0, "scenario.json", "application/json", text.encode())
+
+    def end(self, content: Mapping[str, Any]) -> None:
+        """END: metadata `end`."""
+        self._writer.add_metadata("end", _texts(content))
+
+    # -- one tick ------------------------------------------------------------------------------------------------
+
+    def tick(self, tick: int, t_ns: int, records: list[Record]) -> None:
+        """All rows of one tick, in the order that seal.py promises."""
+        packets = sorted(
+            (jn.read_packet(record.payload) for record in records if record.kind == Kind.PACKET), key=_packet_order
+        )
+        for record in records:
+            if record.kind == Kind.SESSION:
+                self._add("/session", tick, t_ns, layouts.SESSION.pack(tick, self._sessions))
+                self._sessions += 1
+        for packet in packets:
+            self._packet(tick, t_ns, packet)
+        for record in records:
+            if record.kind == Kind.TRUTH:
+                self._truth(tick, t_ns, jn.read_truth(record.payload))
+        for code, a, b in sorted(jn.read_event(record.payload) for record in records if record.kind == Kind.LAB_EVENT):
+            self._event(tick, t_ns, 0, code, a, b)
+
+    def _truth(self, tick: int, t_ns: int, truth: jn.Truth) -> None:
+        q, w, h, euler, applied, setpoint, source = truth
+        x, y, z = euler
+        rx, ry, rz = setpoint
+        degrees = (x * _DEG, y * _DEG, z * _DEG, *applied, rx * DEG_PER_BAM, ry * DEG_PER_BAM, rz * DEG_PER_BAM)
+        row = layouts.TRUTH.pack(*q, *w, *h, *euler, *degrees, tick, source)
+        self._add("/truth", tick, t_ns, row)
+        self._add("/tf", tick, t_ns, self._transforms.pack(t_ns, q))
+        if not self._scene_sent:
+            self._add("/scene", tick, t_ns, viewer.scene(t_ns))
+            self._scene_sent = True
+
+    def _packet(self, tick: int, t_ns: int, record: PacketRecord) -> None:
+        """The raw packet and, where it can be unpacked, its decoded row."""
+        direction, fate, packet, encoded = record
+        sequence = int.from_bytes(packet[_SEQUENCE_AT], "little")
+        header_tick = int.from_bytes(packet[_TICK_AT], "little")
+        type_ = packet[_TYPE_AT] if len(packet) > _TYPE_AT else 0
+        topic = "/packet/down" if direction == Direction.DOWN else "/packet/up"
+        self._add(topic, sequence, t_ns, layouts.PACKET.pack(header_tick, sequence, type_, fate, packet, encoded))
+        try:
+            frame = frames.unpack(packet).frame
+        except frames.BadPacket:
+            self.undecoded += 1
+            return
+        self._decoded(tick, t_ns, type_, fate, sequence, frame)
+
+    def _decoded(self, tick: int, t_ns: int, type_: int, fate: int, sequence: int, frame: Any) -> None:
+        if type_ == Type.COMMAND:
+            self._add("/command", sequence, t_ns, self._decoder.command(frame, fate))
+        elif type_ == Type.SAMPLE:
+            self._add("/sample", sequence, t_ns, self._decoder.sample(frame, fate))
+        elif type_ == Type.TELEMETRY:
+            self._telemetry(sequence, t_ns, frame, fate)
+        elif type_ == Type.EVENT:
+            self._event(tick, t_ns, 1, frame.code, frame.a, frame.b)
+        elif type_ == Type.CONFIG:
+            self._decoder.config(frame)
+
+    def _telemetry(self, sequence: int, t_ns: int, frame: frames.Telemetry, fate: int) -> None:
+        table = self._decoder.telemetry_table(frame)
+        if "/telemetry" not in self._channels:
+            names = [name for name, _ in table.words]
+            units = json.dumps(dict(table.words))
+            metadata = {"law": table.law, "names": json.dumps(names), "units": units}
+            self._channels.update(_register(self._writer, [("/telemetry", table.layout)], metadata))
+        self._add("/telemetry", sequence, t_ns, table.pack(frame, fate))
+
+    def _event(self, tick: int, t_ns: int, origin: int, code: int, a: int, b: int) -> None:
+        level, text = events.describe(code, a, b)
+        self._add("/event", tick, t_ns, layouts.EVENT.pack(tick, a, b, code, origin))
+        name = "board" if origin else "laboratory"
+        self._add("/log", tick, t_ns, viewer.log(t_ns, level, name, text))
+
+    def _add(self, topic: str, sequence: int, t_ns: int, data: bytes) -> None:
+        self._writer.add_message(self._channels[topic], t_ns, data, t_ns, sequence)
+        self.messages += 1
+
+    # -- what an answer consists of --------------------------------------------------------------------------------
+
+    @staticmethod
+    def is_sample(packet: bytes) -> bool:
+        """The packet is a SAMPLE."""
+        return len(packet) > _TYPE_AT and packet[_TYPE_AT] == Type.SAMPLE
+
+    @staticmethod
+    def answer_frames(packet: bytes) -> int:
+        """How many frames the answer has that this COMMAND opens, itself included; 0 for other frames."""
+        if len(packet) <= _TYPE_AT or packet[_TYPE_AT] != Type.COMMAND:
+            return 0
+        try:
+            return 1 + int(frames.unpack(packet).frame.follows)
+        except frames.BadPacket:
+            return 1
+
+
+class TimingRows:
+    """Writes the rows of timing.mcap: host times, laid on simulation time so that a viewer shows both logs together."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        topics = (
+            ("/timing", layouts.TIMING),
+            ("/event", layouts.EVENT),
+            ("/housekeeping/up", layouts.HOUSEKEEPING),
+            ("/housekeeping/down", layouts.HOUSEKEEPING),
+        )
+        self._channels = _register(writer, topics)
+
+    def host(self, content: Mapping[str, Any]) -> None:
+        """HOST: metadata `host`."""
+        self._writer.add_metadata("host", _texts(content))
+
+    def tick(self, tick: int, t_ns: int, records: list[Record]) -> None:
+        """TIMING, HOUSEKEEPING and the host's own events of one tick, in the order they happened."""
+        for record in records:
+            if record.kind == Kind.LAB_EVENT:
+                code, a, b = jn.read_event(record.payload)
+                data, topic = layouts.EVENT.pack(tick, a, b, code, 0), "/event"
+            elif record.kind == Kind.TIMING:
+                lateness_ns, answer_ns, flags = jn.read_timing(record.payload)
+                data, topic = layouts.TIMING.pack(lateness_ns, answer_ns, tick, flags), "/timing"
+            else:
+                direction, host_ns, packet = jn.read_housekeeping(record.payload)
+                data = layouts.HOUSEKEEPING.pack(host_ns, packet)
+                topic = "/housekeeping/down" if direction == Direction.DOWN else "/housekeeping/up"
+            self._writer.add_message(self._channels[topic], t_ns, data, t_ns, tick)
+
+
+def _packet_order(record: PacketRecord) -> tuple[int, int, int, int, bytes, bytes]:
+    packet = record.packet
+    type_ = packet[_TYPE_AT] if len(packet) > _TYPE_AT else 0
+    sequence = int.from_bytes(packet[_SEQUENCE_AT], "little")
+    return record.direction, type_, sequence, record.fate, packet, record.encoded
+
+
+def _register(writer: Writer, topics: Any, metadata: dict[str, str] | None = None) -> dict[str, int]:
+    """Channels of our own layouts; layouts that share a name share a schema."""
+    ids: dict[str, int] = {}
+    channels = {}
+    for topic, layout in topics:
+        if layout.name not in ids:
+            ids[layout.name] = writer.register_schema(layout.name, layouts.SCHEMA_ENCODING, layout.schema)
+        channels[topic] = writer.register_channel(topic, layouts.ENCODING, ids[layout.name], metadata or {})
+    return channels
+
+
+def _texts(content: Mapping[str, Any]) -> dict[str, str]:
+    """MCAP metadata is text to text: everything but text becomes canonical JSON, keys sorted."""
+    return {
+        key: value if isinstance(value, str) else json.dumps(value, sort_keys=True, ensure_ascii=False)
+        for key, value in sorted(content.items())
+    }
