@@ -1,0 +1,49 @@
+"""The control laws: one file each, one line here. A file holds the float reference and the fixed form side by side."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Protocol
+
+import numpy as np
+
+from protocol.law_tables import Configuration
+
+LAWS: dict[str, str] = {
+    "pd": "firmware_sim.controllers.pd:Pd",
+    "mrac": "firmware_sim.controllers.mrac:Mrac",
+    "appc": "firmware_sim.controllers.appc:Appc",
+}
+# Files of this folder that are not laws.
+SUPPORT = ("inputs", "kinematics", "user")
+
+
+class LawRefuses(ValueError):
+    """The law cannot fly with this configuration; the message says why in one line."""
+
+
+class Law(Protocol):
+    """One control law in one arithmetic. Arrays are int64 in the fixed form and float64 in the float form."""
+
+    has_model: bool  # without a reading: propagates its model, else repeats its last command
+    reference_restarted: bool  # the last step() began the reference anew (bumpless start)
+
+    def step(self, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+        """One tick: `inp` and `out` as in inputs.py, `ref` the state of guidance.reference after its advance()."""
+
+    def telemetry(self) -> list[int]:
+        """The law's TELEMETRY words, in the order of its table."""
+
+
+def new_law(name: str, configuration: Configuration) -> Law:
+    """The law registered as `name` in the form of the configuration; raises LawRefuses."""
+    module, _, attribute = LAWS[name].partition(":")
+    law: Law = getattr(importlib.import_module(module), attribute)(configuration)
+    return law
+
+
+def user_law(cls: type, configuration: Configuration) -> Law:
+    """A user's own class as a law (float form)."""
+    from firmware_sim.controllers.user import UserLaw
+
+    return UserLaw(cls, configuration)

@@ -1,0 +1,1 @@
+"""Guidance that flies: the reference model between set-point and law."""

@@ -1,0 +1,222 @@
+"""Reference model: set-point r(k) in, reference ym(k) .. ym(k+2) out, per axis, in float and in integers.
+
+Critically damped, double pole p = exp(-wn T_s), lead d (r(k) first shows in ym(k+d)). With m = k + d - 1, per axis:
+
+    am = k1 wrap(r(k) - ym(m)) - k2 vm(m)             limited to +-accel_limit, vm + am to +-rate_limit
+    ym(m+1) = ym(m) + vm(m) + half am,  vm(m+1) = vm(m) + am
+    zoh:   half = 1/2, k1 = (1-p)^2, k2 = (1-p)(3+p)/2: ym(k+d) = D r / (1 - p q^-1)^2, D = (1-p)^2 (1 + q^-1)/2
+    paper: half = 1,   k1 = (1-p)^2, k2 = 1 - p^2:      the same with D = (1-p)^2
+    none:  ym = r(k)
+
+Start at the first reading y: ym up to m is y and, with zoh, r(k-1) = r(k), that is vm(m) = 2 ((1-p)/(1+p))^2 (r - y).
+Units: rad and samples, or bam (positions) and 2^-36 turn (rates, accelerations); the recursion itself runs on 2^-48 turn
+so that a slow model does not stick. Positions are modulo one turn.
+Source: study of paper 004, sections 0 and 3.1.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numba.extending import register_jitable
+
+from firmware_sim import jit
+from firmware_sim.fixed import INT32_MAX, clip, div_trunc, mul_q, mul_wide, sat32, shift_round, wrap32, wrap_bits
+from protocol.law_tables import COMMON, REFERENCE_NONE, REFERENCE_PAPER, REFERENCE_ZOH, dequantise
+
+# Layout of `state`; the first seven are for the laws, three axes each.
+PAST, NOW, NEXT, AHEAD = 0, 3, 6, 9  # ym(k-1), ym(k), ym(k+1), ym(k+2); with lead 1 AHEAD is extrapolated
+RATE_NOW, RATE_NEXT, ACCEL = 12, 15, 18  # vm(k), vm(k+1), am that r(k) brought
+HEAD, HEAD_RATE = 21, 24  # ym and vm at k + lead, 2^-48 turn
+STARTED, SATURATED, LEAD = 27, 28, 29
+SIZE = 30
+# Layout of the parameters.
+KIND, K1, K2, START, ACCEL_MAX, RATE_MAX = range(6)
+
+RATE_LIMIT_48 = 1 << 46  # a quarter turn per sample: the largest rate the integers carry
+
+
+@register_jitable
+def restart_fixed(state: np.ndarray, position: np.ndarray, first: int) -> None:
+    """Begin anew at rest at position[first : first + 3], bam, from t_k on."""
+    for i in range(3):
+        y = position[first + i]
+        for field in (PAST, NOW, NEXT, AHEAD):
+            state[field + i] = y
+        state[HEAD + i] = shift_round(y, -16)
+        for field in (RATE_NOW, RATE_NEXT, ACCEL, HEAD_RATE):
+            state[field + i] = 0
+
+
+@register_jitable
+def restart_float(state: np.ndarray, position: np.ndarray, first: int) -> None:
+    """Begin anew at rest at position[first : first + 3], rad, from t_k on."""
+    for i in range(3):
+        for field in (PAST, NOW, NEXT, AHEAD, HEAD):
+            state[field + i] = position[first + i]
+        for field in (RATE_NOW, RATE_NEXT, ACCEL, HEAD_RATE):
+            state[field + i] = 0.0
+
+
+@register_jitable
+def wrap_pi(angle: float) -> float:
+    """angle modulo a turn, in [-pi, pi]; exact for angles that are there already."""
+    if -math.pi <= angle <= math.pi:
+        return angle
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@register_jitable
+def advance_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
+    """One tick; inp[0] fresh, inp[3:6] euler, inp[19:22] set-point. True if the reference started in this tick."""
+    started = False
+    if state[STARTED] == 0:
+        if inp[0] == 0:
+            return False
+        restart_fixed(state, inp, 3)
+        for i in range(3):
+            rate = mul_wide(par[START], wrap32(inp[19 + i] - inp[3 + i]), 30)
+            state[HEAD_RATE + i] = clip(rate, -par[RATE_MAX], par[RATE_MAX])
+        state[STARTED] = 1
+        started = True
+    for i in range(3):
+        _advance_axis_fixed(state, par, inp, i)
+    return started
+
+
+@register_jitable
+def _advance_axis_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: int) -> None:
+    position, rate = state[HEAD + i], state[HEAD_RATE + i]
+    error = wrap32(inp[19 + i] - shift_round(position, 16))
+    wanted = mul_wide(par[K1], error, 30) - mul_wide(rate, par[K2], 30)
+    accel = clip(wanted, -par[ACCEL_MAX], par[ACCEL_MAX])
+    rate_new = clip(rate + accel, -par[RATE_MAX], par[RATE_MAX])
+    if rate_new == RATE_LIMIT_48 or rate_new == -RATE_LIMIT_48:
+        state[SATURATED] = 1
+    accel = rate_new - rate
+    half = accel if par[KIND] == REFERENCE_PAPER else shift_round(accel, 1)
+    position = wrap_bits(position + rate + half, 48)
+    if par[KIND] == REFERENCE_NONE:
+        position, rate, rate_new, accel = shift_round(inp[19 + i], -16), 0, 0, 0
+    state[HEAD + i], state[HEAD_RATE + i] = position, rate_new
+    head = wrap32(shift_round(position, 16))
+    state[ACCEL + i] = sat32(shift_round(accel, 12))
+    state[PAST + i] = state[NOW + i]
+    if par[KIND] == REFERENCE_NONE:
+        state[NOW + i], state[NEXT + i], state[AHEAD + i] = head, head, head
+    elif state[LEAD] == 2:
+        state[NOW + i], state[NEXT + i], state[AHEAD + i] = state[NEXT + i], state[AHEAD + i], head
+        state[RATE_NOW + i], state[RATE_NEXT + i] = state[RATE_NEXT + i], sat32(shift_round(rate, 12))
+    else:
+        state[NOW + i], state[NEXT + i] = state[NEXT + i], head
+        state[AHEAD + i] = wrap32(shift_round(position + rate_new, 16))
+        state[RATE_NOW + i], state[RATE_NEXT + i] = sat32(shift_round(rate, 12)), sat32(shift_round(rate_new, 12))
+
+
+@register_jitable
+def advance_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
+    """As advance_fixed(), in rad."""
+    started = False
+    if state[STARTED] == 0.0:
+        if inp[0] == 0.0:
+            return False
+        restart_float(state, inp, 3)
+        for i in range(3):
+            rate = par[START] * wrap_pi(inp[19 + i] - inp[3 + i])
+            state[HEAD_RATE + i] = min(max(rate, -par[RATE_MAX]), par[RATE_MAX])
+        state[STARTED] = 1.0
+        started = True
+    for i in range(3):
+        _advance_axis_float(state, par, inp, i)
+    return started
+
+
+@register_jitable
+def _advance_axis_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: int) -> None:
+    position, rate = state[HEAD + i], state[HEAD_RATE + i]
+    wanted = par[K1] * wrap_pi(inp[19 + i] - position) - par[K2] * rate
+    accel = min(max(wanted, -par[ACCEL_MAX]), par[ACCEL_MAX])
+    rate_new = min(max(rate + accel, -par[RATE_MAX]), par[RATE_MAX])
+    accel = rate_new - rate
+    position = position + rate + (accel if par[KIND] == REFERENCE_PAPER else 0.5 * accel)
+    if par[KIND] == REFERENCE_NONE:
+        position, rate, rate_new, accel = inp[19 + i], 0.0, 0.0, 0.0
+    state[HEAD + i], state[HEAD_RATE + i], state[ACCEL + i] = position, rate_new, accel
+    state[PAST + i] = state[NOW + i]
+    if par[KIND] == REFERENCE_NONE:
+        state[NOW + i], state[NEXT + i], state[AHEAD + i] = position, position, position
+    elif state[LEAD] == 2.0:
+        state[NOW + i], state[NEXT + i], state[AHEAD + i] = state[NEXT + i], state[AHEAD + i], position
+        state[RATE_NOW + i], state[RATE_NEXT + i] = state[RATE_NEXT + i], rate
+    else:
+        state[NOW + i], state[NEXT + i], state[AHEAD + i] = state[NEXT + i], position, position + rate_new
+        state[RATE_NOW + i], state[RATE_NEXT + i] = rate, rate_new
+
+
+@jit.compile
+def _run_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
+    return advance_fixed(state, par, inp)
+
+
+@jit.compile
+def _run_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
+    return advance_float(state, par, inp)
+
+
+def parameters_fixed(common: Mapping[str, int]) -> list[int]:
+    """Parameter words from CONFIG: k1 Q46, k2 Q30, start Q46, limits in 2^-48 turn (rate: at most 1/4 turn)."""
+    p = common["reference_pole"]
+    one_minus, one_plus = (1 << 30) - p, (1 << 30) + p
+    zoh = common["reference_kind"] == REFERENCE_ZOH
+    k1 = mul_q(one_minus, one_minus, 14)
+    k2 = mul_q(one_minus, one_plus + (1 << 31), 31) if zoh else mul_q(one_minus, one_plus, 30)
+    ratio = div_trunc(shift_round(one_minus, -31), one_plus)
+    start = mul_q(ratio, ratio, 15) if zoh else 0
+    accel = shift_round(common["accel_limit"] or INT32_MAX, -16)
+    rate = clip(shift_round(common["rate_limit"] or INT32_MAX, -16), 0, RATE_LIMIT_48)
+    return [common["reference_kind"], k1, k2, start, accel, rate]
+
+
+def parameters_float(common: Mapping[str, int]) -> list[float]:
+    """The same from the same words, as floats in rad and samples."""
+    pole = next(word for word in COMMON if word.name == "reference_pole")
+    return float_parameters(
+        common["reference_kind"],
+        dequantise(pole, common["reference_pole"], common),
+        (common["accel_limit"] or INT32_MAX) * 2.0 * math.pi / 2**32,
+        (common["rate_limit"] or INT32_MAX) * 2.0 * math.pi / 2**32,
+    )
+
+
+def float_parameters(kind: int, p: float, accel_max: float = math.pi, rate_max: float = math.pi) -> list[float]:
+    """Parameters of the float form for the pole p; limits in rad per sample (squared)."""
+    zoh = kind == REFERENCE_ZOH
+    k2 = (1 - p) * (3 + p) / 2 if zoh else 1 - p * p
+    start = 2 * ((1 - p) / (1 + p)) ** 2 if zoh else 0.0
+    return [float(kind), (1 - p) ** 2, k2, start, accel_max, rate_max]
+
+
+class Reference:
+    """The board's reference model; `state` is what the laws read (see the layout above)."""
+
+    def __init__(self, common: Mapping[str, int], is_float: bool) -> None:
+        self._float = is_float
+        dtype = np.float64 if is_float else np.int64
+        self.par = np.array(parameters_float(common) if is_float else parameters_fixed(common), dtype)
+        self.state = np.zeros(SIZE, dtype)
+        self.state[LEAD] = common["reference_lead"]
+        self._run = _run_float if is_float else _run_fixed
+
+    def advance(self, inp: np.ndarray) -> bool:
+        """One tick, before the law's step; True if the reference started at this tick's reading (its first)."""
+        return bool(self._run(self.state, self.par, inp))
+
+    def words(self) -> tuple[int, ...]:
+        """reference[3] in bam and reference_rate[3] in bam/sample, for TELEMETRY."""
+        now, rate = self.state[NOW : NOW + 3].tolist(), self.state[RATE_NOW : RATE_NOW + 3].tolist()
+        if self._float:
+            now = [round(y * 2**31 / math.pi) for y in now]
+            rate = [round(v * 2**35 / math.pi) for v in rate]
+        return (*(wrap32(y) for y in now), *(sat32(shift_round(v, 4)) for v in rate))

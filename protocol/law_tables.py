@@ -1,0 +1,446 @@
+"""What the words of CONFIG and TELEMETRY mean: one table for all laws and one per (law id, version).
+
+CONFIG words = COMMON, then the law's params, then `guidance_rows` rows of four words (tick, x, y, z; set-point in
+2^-32 turn, zero before the first row). TELEMETRY words = TELEMETRY_COMMON, then the law's. All words are int32.
+A word holds round(value * 2^q); q is a number or the name of the word that holds it.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+INT32_MAX = 2**31 - 1
+NO_LIMIT = INT32_MAX  # of words whose maximum is infinite: no limit
+STATUS_BAD_WORD, STATUS_UNKNOWN_LAW, STATUS_MISSING = 1, 2, 4  # READY statuses, as in protocol.frames
+NO_INDEX = 0xFFFF
+FORM_FIXED, FORM_FLOAT = 0, 1
+REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
+DESIGN_PRINTED, DESIGN_REPAIRED = 0, 1
+USER_LAW_ID = 0xFFFF
+READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
+AXES = ("x", "y", "z")
+AUTOMATIC = -1.0  # default of a word with fractional bits: as many as the values that use it allow
+
+
+class Word(NamedTuple):
+    """One int32 word. `q`: fractional bits, or the word that holds them; `lsb`, if not 0, replaces 2^-q (user laws)."""
+
+    name: str
+    unit: str
+    q: int | str
+    minimum: float
+    maximum: float
+    default: float
+    about: str
+    choices: tuple[str, ...] = ()
+    lsb: float = 0.0
+
+
+class Variant(NamedTuple):
+    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ from the table's."""
+
+    transport_delays: tuple[int, ...]
+    reference_leads: tuple[int, ...]
+    defaults: Mapping[str, float] = {}
+
+
+class LawTable(NamedTuple):
+    """One law, one version. With lead d, r(k) first shows in ym(k + d); the first allowed lead is the default.
+
+    `variants`, if any, is indexed by the value of the word `variant_word`.
+    """
+
+    law_id: int
+    version: int
+    name: str
+    params: tuple[Word, ...]
+    telemetry: tuple[Word, ...]
+    transport_delays: tuple[int, ...]
+    period_s: tuple[float, float]
+    reference_leads: tuple[int, ...]
+    needs: int
+    variant_word: str = ""
+    variants: tuple[Variant, ...] = ()
+
+    def variant(self, params: Mapping[str, float]) -> Variant:
+        """The design that these parameter values choose; of a law with one design, that one."""
+        if self.variant_word:
+            return self.variants[int(params[self.variant_word])]
+        return Variant(self.transport_delays, self.reference_leads)
+
+
+class ConfigError(ValueError):
+    """A word that cannot be used. `status` and `index` are READY's."""
+
+    def __init__(self, message: str, status: int = STATUS_BAD_WORD, index: int = NO_INDEX) -> None:
+        super().__init__(message)
+        self.status = status
+        self.index = index
+
+
+def _vector(name: str, unit: str, q: int | str, low: float, high: float, default: Sequence[float], about: str,
+            axes: Sequence[str] = AXES) -> tuple[Word, ...]:  # fmt: skip
+    return tuple(
+        Word(f"{name}_{axis}", unit, q, low, high, value, f"{about}, {axis}")
+        for axis, value in zip(axes, default, strict=True)
+    )
+
+
+def _flag(name: str, default: int, about: str) -> Word:
+    return Word(name, "", 0, 0, 1, default, about, ("off", "on"))
+
+
+COMMON: tuple[Word, ...] = (
+    Word("law_id", "", 0, 1, USER_LAW_ID, 1, "selects, with law_version, the table of this law"),
+    Word("law_version", "", 0, 0, 65535, 1, "version of the law's table"),
+    Word("form", "", 0, 0, 1, 0, "arithmetic of the law", ("fixed", "float")),
+    Word("period_us", "us", 0, 1000, 60_000_000, 500_000, "sampling period T_s"),
+    Word("transport_delay_ticks", "tick", 0, 0, 4, 1, "n: COMMAND(k) acts from t_(k+n) on"),
+    Word("hold_limit", "tick", 0, 0, 1_000_000, 10, "misses in a row that hold the last torque; then zero"),
+    Word("link_limit", "tick", 0, 1, 1_000_000, 20, "ticks without a SAMPLE until COMMAND is zero"),
+    Word("sample_timeout_us", "us", 0, 0, 60_000_000, 100_000, "a SAMPLE later than this counts as lost"),
+    Word("answer_delay_us", "us", 0, 0, 60_000_000, 0, "execution model: time the board is busy with one step"),
+    Word("telemetry_every", "tick", 0, 0, 1_000_000, 1, "TELEMETRY(k) where k is a multiple of this; 0: never"),
+    Word("torque_bits", "", 0, 8, 30, 30, "LSB of a torque is 2^-torque_bits N m"),
+    Word("momentum_bits", "", 0, 8, 30, 28, "LSB of a momentum is 2^-momentum_bits N m s"),
+    Word("rate_bits", "", 0, 8, 30, 28, "LSB of a rate is 2^-rate_bits rad/s"),
+    Word("readings_mask", "", 0, 0, 7, 1, "readings the law needs: 1 euler, 2 quaternion, 4 rate"),
+    *_vector("torque_limit", "N m", "torque_bits", 0, math.inf, (math.inf,) * 3, "torque limit (2147483647: none)"),
+    Word("reference_kind", "", 0, 0, 2, 1, "reference model", ("none", "zoh", "paper")),
+    Word("reference_lead", "tick", 0, 1, 2, 2, "d: the set-point of tick k first shows in the reference of k + d"),
+    Word("reference_pole", "", 30, 0, 1, math.exp(-0.075), "p = exp(-wn T_s), double pole of the reference model"),
+    Word("rate_limit", "2^-32 turn/sample", 0, 0, INT32_MAX, 0, "limit of the reference's rate, 0: none"),
+    Word("accel_limit", "2^-32 turn/sample^2", 0, 0, INT32_MAX, 0, "limit of the reference's acceleration, 0: none"),
+    Word("setpoint_source", "", 0, 0, 1, 0, "where the set-point comes from", ("table", "sample")),
+    Word("guidance_rows", "", 0, 0, 4096, 0, "number of guidance rows after the law's parameters"),
+)
+
+ROW_WORDS = 4  # tick, x, y, z
+
+TELEMETRY_COMMON: tuple[Word, ...] = (
+    *_vector("reference", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "reference ym(k)"),
+    *_vector("reference_rate", "2^-32 turn/sample", 0, -(2**31), INT32_MAX, (0, 0, 0), "its rate at t_k"),
+    *_vector("setpoint", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "set-point r(k)"),
+    Word("samples_lost", "", 0, 0, INT32_MAX, 0, "ticks stepped without a usable SAMPLE"),
+    Word("overruns", "", 0, 0, INT32_MAX, 0, "SAMPLEs that found the board busy"),
+    Word("dropped", "", 0, 0, INT32_MAX, 0, "SAMPLEs for a tick already stepped"),
+    Word("saturations", "", 0, 0, INT32_MAX, 0, "ticks with the torque at its limit"),
+)
+
+_INERTIA = (2.13, 3.04, 3.09)
+_INERTIA_WORDS = _vector("inertia_kgm2", "kg m^2", 26, 0.05, 30, _INERTIA, "principal inertia the law believes in")
+
+PD = LawTable(
+    law_id=1,
+    version=1,
+    name="pd",
+    params=(
+        Word("kp_bits", "", 0, 0, 45, AUTOMATIC, "fractional bits of kp"),
+        Word("kd_bits", "", 0, 0, 45, AUTOMATIC, "fractional bits of kd"),
+        *_vector("kp", "N m/rad", "kp_bits", -1e6, 1e6, (2.1087e-3, 3.0096e-3, 3.0591e-3), "attitude gain"),
+        *_vector("kd", "N m s/rad", "kd_bits", -1e6, 1e6, (0.03621, 0.05168, 0.05253), "rate gain"),
+    ),
+    telemetry=_vector("error", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "ym(k) - y(k)"),
+    transport_delays=(0, 1, 2, 3, 4),
+    period_s=(0.005, 10.0),
+    reference_leads=(2, 1),
+    needs=READ_EULER,
+)
+
+_THETA = ("a1", "a2", "b0", "b1", "d")
+MRAC = LawTable(
+    law_id=2,
+    version=1,
+    name="mrac",
+    params=(
+        Word("design", "", 0, 0, 1, DESIGN_REPAIRED, "d = 1 as printed, or d = 2", ("printed", "repaired")),
+        Word("c2_pole", "", 30, 0, 0.999, 0.8, "double pole of the regulation C2 (printed design: 0.001)"),
+        Word("kappa", "", 30, 0, 1, 0.5, "repaired: the cancelled zero lies at -kappa"),
+        Word("forgetting", "", 30, 0.9, 1, 0.998, "forgetting factor lambda of the identification"),
+        Word("trace_max", "", 20, 1, math.inf, 100, "no forgetting while trace F is at or above this"),
+        Word("F0", "", 20, 1e-4, 100, 1, "initial covariance, F0 times the identity"),
+        _flag("decouple", 0, "Euler decoupling along the reference (MID)"),
+        _flag("identify", 1, "recursive least squares on or off"),
+        *_INERTIA_WORDS,
+        *_vector("printed_b0", "rad/(N m)", 30, -2, 2, (0.307, 0.305, 0.302), "printed design: b0"),
+        *_vector("printed_b1", "rad/(N m)", 30, -2, 2, (0.0586, 0.0411, 0.0404), "printed design: b1"),
+    ),
+    telemetry=(
+        *(
+            Word(f"{name}_{axis}", "", 28, -8, 8, 0, f"identified {name}, {axis}")
+            for axis in AXES
+            for name in _THETA
+        ),
+        *_vector("trace", "", 16, 0, 32768, (5, 5, 5), "trace of the covariance F"),
+    ),
+    transport_delays=(0, 1),
+    period_s=(0.2, 1.0),
+    reference_leads=(2, 1),
+    needs=READ_EULER,
+    variant_word="design",
+    variants=(Variant((0, 1), (1,), {"c2_pole": 0.001}), Variant((1,), (2,))),
+)
+
+APPC = LawTable(
+    law_id=3,
+    version=1,
+    name="appc",
+    params=(
+        Word("controller_pole", "", 30, 0, 0.99, 0.7, "double pole of the state feedback"),
+        Word("observer_pole", "", 30, 0, 0.99, 0.7, "triple pole of the observer"),
+        _flag("adapt", 1, "adapt the gain g of each axis"),
+        _flag("gyro", 0, "compensate the gyroscopic torque"),
+        *_INERTIA_WORDS,
+        Word("orbit_rate_radps", "rad/s", 38, 0, 0.007, 1.0830778e-3, "orbital rate w0, used with gyro"),
+    ),
+    telemetry=(
+        *_vector("g", "", 28, 0.6, 1.7, (1, 1, 1), "identified gain: inertia is inertia_kgm2 / g"),
+        *_vector("P", "", 34, 0, 0.1, (0.1, 0.1, 0.1), "variance of g"),
+        *_vector("innovation", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "reading minus prediction"),
+        *_vector("disturbance", "turn/sample^2", 36, -0.03125, 0.03125, (0, 0, 0), "estimated disturbance w"),
+    ),
+    transport_delays=(1,),
+    period_s=(0.2, 1.0),
+    reference_leads=(2,),
+    needs=READ_EULER,
+)
+
+LAWS: dict[tuple[int, int], LawTable] = {(law.law_id, law.version): law for law in (PD, MRAC, APPC)}
+
+
+def law_by_name(name: str) -> LawTable:
+    """The newest table of the built-in law `name`; raises ConfigError that lists the known ones."""
+    tables = [table for table in LAWS.values() if table.name == name]
+    if not tables:
+        known = ", ".join(sorted(table.name for table in LAWS.values()))
+        raise ConfigError(f"law.name: expected one of {known}, got {name!r}", STATUS_UNKNOWN_LAW, 0)
+    return max(tables, key=lambda table: table.version)
+
+
+def user_table(name: str, params: Mapping[str, tuple[float, str, float]]) -> LawTable:
+    """Table of a user's own law from its PARAMS {name: (default, unit, lsb)}; float form, no telemetry of its own."""
+    words = tuple(
+        Word(key, unit, 0, -lsb * 2**31, lsb * INT32_MAX, default, "", (), lsb)
+        for key, (default, unit, lsb) in params.items()
+    )
+    return LawTable(USER_LAW_ID, 1, name, words, (), (0, 1, 2, 3, 4), (0.001, 60.0), (2, 1), READ_EULER)
+
+
+# -- numbers and words ------------------------------------------------------------------------------------------------
+
+
+def lsb_of(word: Word, words: Mapping[str, int]) -> float:
+    """Value of one count of `word`; `words` holds the word that `word.q` may name."""
+    if word.lsb:
+        return word.lsb
+    return math.ldexp(1.0, -(words[word.q] if isinstance(word.q, str) else word.q))
+
+
+def quantise(word: Word, value: float | str | bool, words: Mapping[str, int]) -> int:
+    """The int32 of `value`; raises ConfigError that names key, range and unit."""
+    number = _number(word, value)
+    if number == math.inf and word.maximum == math.inf:
+        return NO_LIMIT
+    if not word.minimum <= number <= word.maximum:
+        raise ConfigError(f"{word.name}: expected {_range(word)}, got {value}")
+    count = round(number / lsb_of(word, words))
+    if not -INT32_MAX - 1 <= count <= INT32_MAX:
+        raise ConfigError(f"{word.name}: {value} {word.unit} does not fit 32 bits of {lsb_of(word, words)} each")
+    return count
+
+
+def dequantise(word: Word, count: int, words: Mapping[str, int]) -> float:
+    """The value of a word; the inverse of quantise() up to half an LSB."""
+    if count == NO_LIMIT and word.maximum == math.inf:
+        return math.inf
+    return count * lsb_of(word, words)
+
+
+def _number(word: Word, value: float | str | bool) -> float:
+    if isinstance(value, str):
+        if value not in word.choices:
+            raise ConfigError(f"{word.name}: expected {_range(word)}, got {value!r}")
+        return float(word.choices.index(value))
+    return float(value)
+
+
+def _range(word: Word) -> str:
+    if word.choices:
+        return "one of " + ", ".join(word.choices)
+    return f"{word.minimum:g} to {word.maximum:g} {word.unit}".rstrip()
+
+
+# -- whole configurations ---------------------------------------------------------------------------------------------
+
+
+class Configuration(NamedTuple):
+    """CONFIG, understood. `common`, `params`: words by name; `values`: both as numbers in their units."""
+
+    table: LawTable
+    words: tuple[int, ...]
+    common: dict[str, int]
+    params: dict[str, int]
+    values: dict[str, float]
+    rows: tuple[tuple[int, int, int, int], ...]
+    hash: int
+
+    def vector(self, name: str) -> tuple[float, float, float]:
+        """The three values name_x, name_y, name_z."""
+        x, y, z = (self.values[f"{name}_{axis}"] for axis in AXES)
+        return x, y, z
+
+
+Value = float | str | bool | Sequence[float]
+
+
+def config_words(table: LawTable, values: Mapping[str, Value], rows: Sequence[Sequence[int]] = ()) -> tuple[int, ...]:
+    """CONFIG words of a law. `values`: by word name, or by the name without _x, _y, _z for three; the rest: defaults.
+
+    Raises ConfigError for unknown names, values out of range, and what the law itself excludes.
+    """
+    flat = expand(table, values)
+    variant = table.variant(_defaults(table, flat))
+    flat = {**variant.defaults, "reference_lead": variant.reference_leads[0], "readings_mask": table.needs, **flat}
+    flat |= {"law_id": table.law_id, "law_version": table.version, "guidance_rows": len(rows)}
+    words: dict[str, int] = {}
+    for word in (*COMMON, *table.params):
+        value = flat.get(word.name, word.default)
+        if value == AUTOMATIC and word.default == AUTOMATIC:
+            value = _automatic_bits(table, word, flat)
+        words[word.name] = quantise(word, value, words)
+    return (*words.values(), *(n for row in rows for n in row))
+
+
+def expand(table: LawTable, values: Mapping[str, Value]) -> dict[str, float | str | bool]:
+    """Values by word name: a triple becomes three words, one number under a triple's name sets all three."""
+    names = {word.name for word in (*COMMON, *table.params)}
+    flat: dict[str, float | str | bool] = {}
+    for name, value in values.items():
+        if name in names:
+            if not isinstance(value, str | int | float):
+                raise ConfigError(f"{name}: expected one number, got {value!r}")
+            flat[name] = value
+        elif f"{name}_x" in names:
+            flat |= zip((f"{name}_{axis}" for axis in AXES), _triple(name, value), strict=True)
+        else:
+            raise ConfigError(_unknown(table, name))
+    return flat
+
+
+def _triple(name: str, value: Value) -> Sequence[float]:
+    if isinstance(value, int | float):
+        return (value,) * 3
+    if isinstance(value, str) or len(value) != 3:
+        raise ConfigError(f"{name}: expected 3 numbers, got {value!r}")
+    return value
+
+
+def _unknown(table: LawTable, name: str) -> str:
+    known = sorted({word.name.removesuffix("_x") for word in table.params if not word.name.endswith(("_y", "_z"))})
+    return f"law.params.{name}: unknown for law {table.name}; known: {', '.join(known)}"
+
+
+def _defaults(table: LawTable, flat: Mapping[str, float | str | bool]) -> dict[str, float]:
+    return {word.name: _number(word, flat.get(word.name, word.default)) for word in table.params}
+
+
+def _automatic_bits(table: LawTable, bits: Word, flat: Mapping[str, float | str | bool]) -> float:
+    """The most fractional bits with which every word that uses them still fits int32."""
+    users = [word for word in (*COMMON, *table.params) if word.q == bits.name]
+    peak = max(abs(_number(word, flat.get(word.name, word.default))) for word in users)
+    best = int(bits.maximum)
+    while best > bits.minimum and peak * 2.0**best > INT32_MAX:
+        best -= 1
+    return best
+
+
+def parse_configuration(words: Sequence[int], user: LawTable | None = None) -> Configuration:
+    """The inverse of config_words(); raises ConfigError with READY's status and the index of the bad word.
+
+    `user`: the table of the one law that is not built in, if the board has one.
+    """
+    if len(words) < len(COMMON):
+        raise ConfigError(f"CONFIG: expected at least {len(COMMON)} words, got {len(words)}", STATUS_MISSING)
+    common = _named(COMMON, words, 0)
+    table = _table_of(common["law_id"], common["law_version"], user)
+    law_end = len(COMMON) + len(table.params)
+    expected = law_end + ROW_WORDS * common["guidance_rows"]
+    if len(words) != expected:
+        raise ConfigError(f"CONFIG: expected {expected} words, got {len(words)}", STATUS_MISSING)
+    params = _named(table.params, words[:law_end], len(COMMON))
+    both = common | params
+    values = {word.name: dequantise(word, both[word.name], both) for word in (*COMMON, *table.params)}
+    _check_ranges(table, values)
+    return Configuration(
+        table, tuple(words), common, params, values, _rows(words, law_end), table_hash(table, words)
+    )
+
+
+def _named(table: Sequence[Word], words: Sequence[int], start: int) -> dict[str, int]:
+    if len(words) < start + len(table):
+        raise ConfigError(f"CONFIG: expected {start + len(table)} words or more, got {len(words)}", STATUS_MISSING)
+    return {word.name: int(words[start + i]) for i, word in enumerate(table)}
+
+
+def _table_of(law_id: int, version: int, user: LawTable | None) -> LawTable:
+    if law_id == USER_LAW_ID and user is not None:
+        return user
+    table = LAWS.get((law_id, version))
+    if table is None:
+        known = ", ".join(f"{i} version {v} ({t.name})" for (i, v), t in sorted(LAWS.items()))
+        raise ConfigError(f"CONFIG: law id {law_id} version {version} is unknown; known: {known}", STATUS_UNKNOWN_LAW, 0)
+    return table
+
+
+def _check_ranges(table: LawTable, values: Mapping[str, float]) -> None:
+    for index, word in enumerate((*COMMON, *table.params)):
+        slack = 0.0 if word.q == 0 and not word.lsb else 1e-9 * (1.0 + abs(word.minimum))  # half an LSB of rounding
+        value = values[word.name]
+        if not word.minimum - slack <= value <= word.maximum + slack:
+            raise ConfigError(f"{word.name}: expected {_range(word)}, got {value:g}", index=index)
+
+
+def _rows(words: Sequence[int], start: int) -> tuple[tuple[int, int, int, int], ...]:
+    rows = []
+    for i in range(start, len(words), ROW_WORDS):
+        tick, x, y, z = (int(n) for n in words[i : i + ROW_WORDS])
+        if tick < 0 or (rows and tick <= rows[-1][0]):
+            raise ConfigError(f"guidance row {len(rows)}: tick {tick} does not come after the row before", index=i)
+        rows.append((tick, x, y, z))
+    return tuple(rows)
+
+
+def refusal(configuration: Configuration) -> str | None:
+    """Why the law cannot fly with this configuration, in one line, or None: delay, lead, period, readings."""
+    table, common = configuration.table, configuration.common
+    variant = table.variant(configuration.values)
+    low, high = table.period_s
+    if not low * 1e6 <= common["period_us"] <= high * 1e6:
+        return f"law {table.name}: expected period_s {low:g} to {high:g}, got {common['period_us'] * 1e-6:g}"
+    if common["transport_delay_ticks"] not in variant.transport_delays:
+        known = ", ".join(map(str, variant.transport_delays))
+        return f"law {table.name}: expected transport_delay_ticks {known}, got {common['transport_delay_ticks']}"
+    if common["reference_lead"] not in variant.reference_leads:
+        known = ", ".join(map(str, variant.reference_leads))
+        return f"law {table.name}: expected reference_lead {known}, got {common['reference_lead']}"
+    if table.needs & ~common["readings_mask"]:
+        return f"law {table.name}: expected readings_mask with bits {table.needs}, got {common['readings_mask']}"
+    return None
+
+
+def table_text(table: LawTable) -> str:
+    """Canonical text of all words of a law; its hash and the tables of SPEC.md come from here."""
+    lines = [f"law {table.law_id} {table.version}"]
+    groups = (("common", COMMON), ("param", table.params), ("tel", (*TELEMETRY_COMMON, *table.telemetry)))
+    for group, words in groups:
+        lines += [f"{group} {w.name} {w.unit} {w.q} {w.minimum!r} {w.maximum!r} {w.lsb!r}" for w in words]
+    return "\n".join(lines)
+
+
+def table_hash(table: LawTable, words: Sequence[int]) -> int:
+    """crc32 over table_text() and all CONFIG words: both ends agree on meaning and values. READY carries it."""
+    return zlib.crc32(struct.pack(f"<{len(words)}i", *words), zlib.crc32(table_text(table).encode()))
