@@ -43,5 +43,5 @@ class Attitude:
         return Reading(0, tuple([self._wire(angle) for angle in angles.tolist()]))
 
     def _wire(self, angle_rad: float) -> int:
-        bam = round(angle_rad * self._steps_per_rad) << self._shift
+        bam: int = round(angle_rad * self._steps_per_rad) << self._shift
         return (bam + 0x80000000 & 0xFFFFFFFF) - 0x80000000

@@ -1,4 +1,4 @@
-"""Star tracker: the attitude quaternion q_BN of the body relative to the inertial frame, whatever `attitude.frame` says.
+"""Star tracker: the quaternion q_BN of the body relative to the inertial frame, whatever `attitude.frame` says.
 
     q_read = q_BN (x) (1, d/2) / |.|,  d = noise rotation vector in body axes, Gaussian, noise_deg on each axis
     component = round(q_i / LSB) * LSB,  LSB = 2 / 2^bits; bits 0 = 31, the wire's own

@@ -1,0 +1,345 @@
+"""A scenario: one YAML file that says everything about a test, validated into a frozen model with units and defaults.
+
+`load_scenario("mrac-rs232", ["duration_s=60"])` reads a built-in or a file, applies `extends` and the overrides, and
+raises ScenarioInvalid with one line per problem. The sections and their defaults are in scenario_sections.py.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path as FilePath
+from typing import Annotated, Any
+
+from pydantic import Field, PrivateAttr, ValidationError
+
+from protocol.law_tables import INT32_MAX, LawTable
+from sil import scenario_law as laws
+from sil.plants import PLANTS
+from sil.profiles import PROFILES, SetpointRow, setpoints
+from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of, one_of, shown
+from sil.scenario_metrics import refused_metric
+from sil.scenario_sections import (
+    Actuators,
+    Attitude,
+    Board,
+    Clock,
+    Guidance,
+    Law,
+    Link,
+    Metrics,
+    Plant,
+    Requirement,
+    Section,
+    Sensors,
+    Wire,
+)
+from sil.scenario_source import Source, from_values, read_scenario
+from sil.scenario_validation import problems_of, unknown_keys
+
+NOT_IDENTITY = ("clock", "link", "board", "out")  # how it is run, not what is run
+MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
+
+
+class Scenario(Section):
+    """One test. Times in s, angles in deg, triples [x, y, z]; see the sections for what is inside each."""
+
+    name: str = "scenario"
+    """What the run directory is called after; default: the file's name."""
+    about: str = ""
+    """One line for `sil scenarios`."""
+    seed: Annotated[int, Field(ge=0, lt=2**64)] = 0
+    duration_s: Annotated[float, Field(gt=0)] = 600.0
+    """A whole number of periods."""
+    period_s: Annotated[float, Field(ge=0.001, le=60)] = 0.5
+    """T_s, a whole number of microseconds."""
+    transport_delay_ticks: Annotated[int, Field(ge=0, le=4)] = 1
+    """n: COMMAND(k) acts from t_(k+n) on; 0 only in lockstep."""
+    clock: Clock = "lockstep"
+    """lockstep, realtime or scaled:N"""
+    board: Board = "process"
+    """process, inproc, none, or where a board that already runs listens"""
+    link: Link = Link()
+    out: str | None = None
+    """Run directory; null: runs/NAME-NNN"""
+    law: Law = Law()
+    guidance: Guidance = Guidance()
+    attitude: Attitude = Attitude()
+    sensors: Sensors = Sensors()
+    plant: Plant = Plant()
+    actuators: Actuators = Actuators()
+    schedule: str | None = None
+    """For board none: CSV of motor torques on the wheels, t,u1,u2,u3, relative to the scenario file."""
+    wire: Wire = Wire()
+    hold_limit: Annotated[int, Field(ge=0, le=1_000_000)] = 10
+    """Misses in a row that hold the last torque; then zero."""
+    link_limit: Annotated[int, Field(ge=1, le=1_000_000)] = 20
+    """Ticks without a SAMPLE until the board commands zero."""
+    sample_timeout_s: Annotated[float, Field(ge=0, le=60)] | None = None
+    """How late a SAMPLE may be in real time; null: 0.2 T_s"""
+    answer_delay_s: Annotated[float, Field(ge=0, le=60)] = 0.0
+    """Execution model: how long the board is busy with one step."""
+    telemetry_every: Annotated[int, Field(ge=0, le=1_000_000)] = 1
+    """TELEMETRY in every so many ticks; 0: never"""
+    expect_missed: bool = False
+    """True: this scenario is meant to miss its deadlines, `sil check` accepts it."""
+    metrics: Metrics = Metrics()
+    require: tuple[Requirement, ...] = ()
+    """What decides the verdict."""
+
+    _source: Source = PrivateAttr()
+    _table: LawTable = PrivateAttr()
+
+    # -- derived ------------------------------------------------------------------------------------------------------
+
+    @property
+    def period_us(self) -> int:
+        """T_s in us, exact."""
+        return round(self.period_s * 1e6)
+
+    @property
+    def period_ns(self) -> int:
+        """T_s in ns, exact."""
+        return self.period_us * 1000
+
+    @property
+    def ticks(self) -> int:
+        """Number of ticks of the run; the last one is ticks - 1."""
+        return round(self.duration_s * 1e6) // self.period_us
+
+    @property
+    def sample_timeout_us(self) -> int:
+        """sample_timeout_s with its default, in us."""
+        return self.period_us // 5 if self.sample_timeout_s is None else round(self.sample_timeout_s * 1e6)
+
+    @property
+    def clock_scale(self) -> float:
+        """Simulated seconds per wall second: 1 for realtime, N for scaled:N, 0 for lockstep."""
+        return {"lockstep": 0.0, "realtime": 1.0}.get(self.clock) or float(self.clock.partition(":")[2] or 0)
+
+    @property
+    def torque_bits(self) -> int:
+        """wire.torque_bits with its default: 30, lowered until the torque limit fits, 20 without a limit."""
+        limits = self.actuators.wheels.torque_max_Nm
+        if self.wire.torque_bits is not None:
+            return self.wire.torque_bits
+        if None in limits:
+            return 20
+        largest = max(limit for limit in limits if limit is not None)
+        return next((bits for bits in range(30, 8, -1) if round(largest * 2**bits) < INT32_MAX), 8)
+
+    @property
+    def law_table(self) -> LawTable:
+        """The table of the law and version that fly."""
+        return self._table
+
+    def law_values(self) -> dict[str, Any]:
+        """law.params as protocol.law_tables.config_words() takes them."""
+        return laws.wire_values(self._table, self.law.params)
+
+    def setpoints(self) -> tuple[SetpointRow, ...]:
+        """The guidance profile as rows (tick, set-point in deg)."""
+        return setpoints(self.guidance, self.period_s, self.ticks)
+
+    def file_of(self, key: str) -> FilePath | None:
+        """The file that `schedule` or `law.name` names (without :CLASS), found from the file which says so."""
+        text = {"schedule": self.schedule, "law.name": self.law.name.rpartition(":")[0] or None}[key]
+        return None if text is None else self._source.directory_of(tuple(key.split("."))) / text
+
+    def where(self, key: str) -> Where:
+        """File and line (or --set) that decided `key`, or the nearest section above it."""
+        return self._source.where_of(tuple(key.split(".")))
+
+    # -- out ----------------------------------------------------------------------------------------------------------
+
+    def resolved(self) -> dict[str, Any]:
+        """Every key with its value, defaults included, in a fixed order; loads again with load_values()."""
+        return self.model_dump(mode="json")
+
+    def identity(self) -> dict[str, Any]:
+        """resolved() without clock, link, board and out: what the numbers of a run depend on."""
+        return {key: value for key, value in self.resolved().items() if key not in NOT_IDENTITY}
+
+
+def load_scenario(
+    name_or_path: str | FilePath, sets: Iterable[str] = (), user_table: laws.UserTable = laws.table_of_user_law
+) -> Scenario:
+    """A built-in scenario or a file, with overrides `a.b=value`; raises ScenarioInvalid.
+
+    `user_table(file, class_name)` gives the parameter table of a user's own law.
+    """
+    return _build(read_scenario(str(name_or_path), tuple(sets)), user_table)
+
+
+def load_values(
+    values: dict[str, Any],
+    sets: Iterable[str] = (),
+    where: str = "recorded scenario",
+    directory: FilePath | None = None,
+    user_table: laws.UserTable = laws.table_of_user_law,
+) -> Scenario:
+    """A scenario from plain values, such as the resolved one of a log; `where` names them in messages."""
+    return _build(from_values(values, where, directory or FilePath(), tuple(sets)), user_table)
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON Schema of a scenario file, for editors."""
+    schema = Scenario.model_json_schema()
+    schema["properties"]["extends"] = {"type": "string", "description": "Scenario this one starts from: name or path."}
+    return schema
+
+
+def _build(source: Source, user_table: laws.UserTable) -> Scenario:
+    found = list(unknown_keys(Scenario, source.data, source.where_of))
+    try:
+        scenario = Scenario.model_validate(source.data)
+    except ValidationError as error:
+        raise ScenarioInvalid(_sorted([*found, *problems_of(error, source.where_of)])) from None
+    scenario._source = source
+    found += [*_law_problems(scenario, source, user_table), *_cross_problems(scenario)]
+    if found:
+        raise ScenarioInvalid(_sorted(found))
+    table = scenario._table
+    law = scenario.law.model_copy(
+        update={"version": table.version, "params": laws.complete(table, scenario.law.params)}
+    )
+    whole = scenario.model_copy(update={"law": law})
+    whole._source, whole._table = source, table
+    return whole
+
+
+def _sorted(problems: Sequence[Problem]) -> list[Problem]:
+    return sorted(problems, key=lambda problem: (problem.where.partition(":")[0], problem.line))
+
+
+# -- what one key alone cannot tell -----------------------------------------------------------------------------------
+
+
+def _law_problems(scenario: Scenario, source: Source, user_table: laws.UserTable) -> Iterator[Problem]:
+    """Finds the law's table (scenario._table) and checks law.params against it."""
+    table: LawTable | str
+    if laws.is_user_law(scenario.law.name):
+        table = _user_table(scenario, user_table)
+    else:
+        table = laws.built_in_table(scenario.law.name, scenario.law.version)
+    if isinstance(table, LawTable):
+        scenario._table = table
+        yield from laws.problems(table, scenario.law.params, source.where_of)
+    elif table.startswith("law.version "):
+        yield _problem(scenario, "law.version", table.removeprefix("law.version "), scenario.law.version)
+    else:
+        yield _problem(scenario, "law.name", table, scenario.law.name)
+
+
+def _user_table(scenario: Scenario, user_table: laws.UserTable) -> LawTable | str:
+    file, class_name = scenario.file_of("law.name"), scenario.law.name.rpartition(":")[2]
+    assert file is not None
+    if not file.is_file():
+        return "a file that exists"
+    try:
+        return user_table(file, class_name)
+    except (ValueError, TypeError, OSError, SyntaxError) as error:
+        reason = " ".join(str(error).split())
+        return f"class {class_name} with PARAMS = {{name: (default, unit, lsb)}} ({reason})"
+
+
+def _cross_problems(scenario: Scenario) -> Iterator[Problem]:
+    checks: tuple[Callable[[Scenario], Iterator[Problem]], ...] = (
+        _times,
+        _names,
+        _steps,
+        _requirements,
+        _inertia,
+        _torque_scale,
+        _files,
+    )
+    for check in checks:
+        yield from check(scenario)
+
+
+def _times(scenario: Scenario) -> Iterator[Problem]:
+    period, duration = scenario.period_s, scenario.duration_s
+    if abs(period * 1e6 - scenario.period_us) > 1e-6 * max(1.0, period):
+        nearest = f"a whole number of microseconds, nearest {scenario.period_us * 1e-6:.6f} s"
+        yield _problem(scenario, "period_s", nearest, period)
+        return
+    ticks = max(1, round(duration * 1e6 / scenario.period_us))
+    if abs(duration * 1e6 - ticks * scenario.period_us) > 0.5:
+        nearest = f"a whole number of periods of {period:g} s, nearest {ticks * scenario.period_us / 1e6:g} s"
+        yield _problem(scenario, "duration_s", nearest, duration)
+    elif ticks > MOST_TICKS:
+        yield _problem(scenario, "duration_s", f"at most {MOST_TICKS} ticks", duration)
+    elif scenario.metrics.from_tick >= ticks:
+        yield _problem(scenario, "metrics.from_tick", f"a tick below {ticks}, the end", scenario.metrics.from_tick)
+
+
+def _names(scenario: Scenario) -> Iterator[Problem]:
+    for key, name, known in (
+        ("plant.kind", scenario.plant.kind, PLANTS),
+        ("guidance.profile", scenario.guidance.profile, PROFILES),
+    ):
+        if name not in known:
+            yield _problem(scenario, key, one_of(known, name), name)
+
+
+def _steps(scenario: Scenario) -> Iterator[Problem]:
+    rows = scenario.guidance.rows
+    if rows and scenario.guidance.profile != "steps":
+        yield _problem(scenario, "guidance.rows", "rows with profile steps only", scenario.guidance.profile)
+    if not rows and scenario.guidance.profile == "steps":
+        yield _problem(scenario, "guidance.rows", "at least one {t_s, attitude_deg} for profile steps", ())
+    for index in range(1, len(rows)):
+        if rows[index].t_s <= rows[index - 1].t_s:
+            expected = f"a number in s above {rows[index - 1].t_s:g}, the row before"
+            yield _problem(scenario, ("guidance", "rows", index, "t_s"), expected, rows[index].t_s)
+
+
+def _requirements(scenario: Scenario) -> Iterator[Problem]:
+    for index, line in enumerate(scenario.require):
+        if expected := refused_metric(line.metric):
+            yield _problem(scenario, ("require", index, "metric"), expected, line.metric)
+        said = [name for name in ("below", "above", "between") if getattr(line, name) is not None]
+        if len(said) != 1:
+            got = " and ".join(said) or "none of them"
+            place = scenario._source.where_of(("require", index))
+            key = key_of(("require", index))
+            yield Problem(str(place), key, "exactly one of below, above, between", got, place.line)
+
+
+def _inertia(scenario: Scenario) -> Iterator[Problem]:
+    inertia, wheels = scenario.plant.inertia_kgm2, scenario.actuators.wheels.inertia_kgm2
+    principal = [inertia[i][i] for i in range(3)]
+    for i in range(3):
+        if principal[i] > principal[i - 1] + principal[i - 2] + 1e-12:
+            limit = f"no moment of inertia above the sum of the other two ({principal[i - 1] + principal[i - 2]:g})"
+            yield _problem(scenario, "plant.inertia_kgm2", limit, principal[i])
+        if scenario.plant.inertia_includes_wheels and wheels[i] >= principal[i]:
+            limit = f"less than plant.inertia_kgm2 ({principal[i]:g}), which includes the wheels"
+            yield _problem(scenario, "actuators.wheels.inertia_kgm2", limit, wheels[i])
+
+
+def _torque_scale(scenario: Scenario) -> Iterator[Problem]:
+    largest = max((limit for limit in scenario.actuators.wheels.torque_max_Nm if limit is not None), default=0.0)
+    if largest * 2**scenario.torque_bits >= INT32_MAX:
+        fits = math.floor(math.log2(INT32_MAX / largest))
+        key = "actuators.wheels.torque_max_Nm" if scenario.wire.torque_bits is None else "wire.torque_bits"
+        if key == "wire.torque_bits":
+            yield _problem(scenario, key, f"at most {fits}, for a limit of {largest:g} N m", scenario.torque_bits)
+        else:
+            yield _problem(scenario, key, f"at most {INT32_MAX / 2**8:.0f} N m", largest)
+
+
+def _files(scenario: Scenario) -> Iterator[Problem]:
+    if scenario.schedule is None:
+        return
+    if scenario.board != "none":
+        yield _problem(scenario, "schedule", "a schedule with board none only", f"board {scenario.board}")
+    file = scenario.file_of("schedule")
+    if file is None or not file.is_file():
+        yield _problem(scenario, "schedule", "a CSV file that exists", scenario.schedule)
+
+
+def _problem(scenario: Scenario, key: str | Path, expected: str, got: object) -> Problem:
+    path = tuple(key.split(".")) if isinstance(key, str) else key
+    place = scenario._source.where_of(path)
+    return Problem(str(place), key_of(path), expected, shown(got), place.line)

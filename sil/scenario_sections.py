@@ -1,0 +1,351 @@
+"""The sections of a scenario: every key with its type, unit (in its name), range and default.
+
+Defaults are the satellite, the orbit, the initial attitude and the sampling of paper 004, so that five lines make a
+scenario. Triples are [x, y, z]. The docstring under a key is its description in the JSON Schema.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+Numbers3 = tuple[float, float, float]
+Limits3 = tuple[float | None, float | None, float | None]
+Matrix3 = tuple[Numbers3, Numbers3, Numbers3]
+
+BOARDS = ("process", "inproc", "none")
+LINKS = ("pty", "udp", "inproc")
+SCALED = re.compile(r"scaled:[0-9]+(\.[0-9]+)?")
+
+
+class Expected(PydanticCustomError):
+    """A refusal that says what would have been accepted."""
+
+    def __new__(cls, expected: str) -> Expected:
+        return super().__new__(cls, "expected", "expected {expected}", {"expected": expected})
+
+
+class Section(BaseModel):
+    """A mapping of known keys; frozen, nothing is converted silently."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
+    )
+
+
+def is_number(value: object) -> bool:
+    """A finite int or float; true and false are no numbers."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _numbers(value: object, count: int) -> tuple[float, ...] | None:
+    fits = isinstance(value, tuple) and len(value) == count and all(is_number(item) for item in value)
+    return tuple(float(item) for item in value) if fits and isinstance(value, tuple) else None
+
+
+def _triple(value: object) -> object:
+    if (numbers := _numbers(value, 3)) is None:
+        raise Expected("3 numbers")
+    return numbers
+
+
+def _quaternion(value: object) -> object:
+    if value is None:
+        return None
+    numbers = _numbers(value, 4)
+    if numbers is None or abs(math.hypot(*numbers) - 1.0) > 1e-6:
+        raise Expected("4 numbers, scalar first, of norm 1")
+    return numbers
+
+
+def _limits(value: object) -> object:
+    items = value if isinstance(value, tuple) else (value,) * 3
+    if len(items) != 3 or not all(item is None or (is_number(item) and item > 0) for item in items):
+        raise Expected("a number above 0, 3 of them, or null for no limit")
+    return tuple(None if item is None else float(item) for item in items)
+
+
+def _not_negative(value: object) -> object:
+    numbers = _numbers(value if isinstance(value, tuple) else (value,) * 3, 3)
+    if numbers is None or min(numbers) < 0:
+        raise Expected("a number not below 0, or 3 of them")
+    return numbers
+
+
+def _one_or_three(value: object) -> object:
+    if (numbers := _numbers(value if isinstance(value, tuple) else (value,) * 3, 3)) is None:
+        raise Expected("a number, or 3 of them")
+    return numbers
+
+
+def _inertia(value: object) -> object:
+    diagonal = _numbers(value, 3)
+    if diagonal is not None:
+        value = tuple(tuple(diagonal[i] if i == j else 0.0 for j in range(3)) for i in range(3))
+    rows = tuple(_numbers(row, 3) for row in value) if isinstance(value, tuple) else ()
+    if len(rows) != 3 or None in rows:
+        raise Expected("3 numbers or 3 rows of 3 numbers")
+    matrix = tuple(row for row in rows if row is not None)
+    if any(matrix[i][j] != matrix[j][i] for i in range(3) for j in range(3)):
+        raise Expected("a symmetric matrix")
+    if not _positive_definite(matrix):
+        raise Expected("a positive definite matrix")
+    return matrix
+
+
+def _interval(value: object) -> object:
+    if value is None:
+        return None
+    numbers = _numbers(value, 2)
+    if numbers is None or numbers[0] > numbers[1]:
+        raise Expected("2 numbers, the lower first")
+    return numbers
+
+
+def _clock(value: object) -> object:
+    if value in ("lockstep", "realtime"):
+        return value
+    if isinstance(value, str) and SCALED.fullmatch(value) and float(value.removeprefix("scaled:")) > 0:
+        return value
+    raise Expected("lockstep, realtime or scaled:N with N above 0")
+
+
+def _board(value: object) -> object:
+    if value in BOARDS or (isinstance(value, str) and re.fullmatch(r"(serial|udp)://\S+", value)):
+        return value
+    raise Expected(f"{', '.join(BOARDS)}, serial://PATH or udp://HOST:PORT")
+
+
+def _url(value: object) -> object:
+    if value in LINKS or (isinstance(value, str) and re.fullmatch(r"serial:///?\S+|udp://[^\s:]+:\d+", value)):
+        return value
+    raise Expected(f"{', '.join(LINKS)}, serial://PATH or udp://HOST:PORT")
+
+
+def _positive_definite(m: tuple[tuple[float, ...], ...]) -> bool:
+    minor2 = m[0][0] * m[1][1] - m[0][1] * m[1][0]
+    minor3 = (
+        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
+        - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
+        + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
+    )
+    return m[0][0] > 0 and minor2 > 0 and minor3 > 0
+
+
+def _three_of(item: dict[str, Any]) -> WithJsonSchema:
+    return WithJsonSchema({"type": "array", "items": item, "minItems": 3, "maxItems": 3})
+
+
+def _one_or(item: dict[str, Any]) -> WithJsonSchema:
+    return WithJsonSchema({"anyOf": [item, _three_of(item).json_schema]})
+
+
+NUMBER: dict[str, Any] = {"type": "number"}
+Triple = Annotated[Numbers3, BeforeValidator(_triple)]
+OneOrThree = Annotated[Numbers3, BeforeValidator(_one_or_three), _one_or(NUMBER)]
+OneOrThreeNotNegative = Annotated[Numbers3, BeforeValidator(_not_negative), _one_or({**NUMBER, "minimum": 0})]
+LimitTriple = Annotated[Limits3, BeforeValidator(_limits), _one_or({"type": ["number", "null"]})]
+InertiaMatrix = Annotated[
+    Matrix3, BeforeValidator(_inertia), _three_of({"anyOf": [NUMBER, _three_of(NUMBER).json_schema]})
+]
+UnitQuaternion = Annotated[tuple[float, float, float, float] | None, BeforeValidator(_quaternion)]
+Interval = Annotated[tuple[float, float] | None, BeforeValidator(_interval)]
+Clock = Annotated[str, BeforeValidator(_clock)]
+Board = Annotated[str, BeforeValidator(_board)]
+Url = Annotated[str, BeforeValidator(_url)]
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+
+
+class Sine(Section):
+    """amplitude * sin(2 pi t / period + phase), torque on the body in body axes, t = simulation time."""
+
+    amplitude_Nm: Triple
+    period_s: Positive
+    phase_deg: float = 0.0
+
+
+class Disturbance(Section):
+    """Torques from outside, in body axes; `disturbance_Nm: [x, y, z]` is short for the constant part."""
+
+    constant_Nm: Triple = (0.0, 0.0, 0.0)
+    sine: tuple[Sine, ...] = ()
+
+
+class Initial(Section):
+    """State at t = 0."""
+
+    frame: Literal["lvlh", "inertial"] = "lvlh"
+    """What attitude and rates are relative to: the orbital frame or the inertial one."""
+    attitude_deg: Triple = (10.0, 10.0, 5.0)
+    """Euler angles in attitude.sequence."""
+    q: UnitQuaternion = None
+    """Scalar first, v_frame = q v_B q*; replaces attitude_deg."""
+    rate_kind: Literal["euler", "body_relative", "body_inertial"] = "euler"
+    """Euler angle rates, body rate relative to the frame, or omega_BN in body axes."""
+    rate_degps: Triple = (0.0, 0.0, 0.0)
+
+
+class Orbit(Section):
+    """Circular orbit; ascending node on the inertial x axis."""
+
+    radius_m: Positive = 6978137.0
+    mu: Positive = 3.986004418e14
+    """Gravitational parameter in m^3/s^2."""
+    inclination_deg: float = 97.8
+    u0_deg: float = 0.0
+    """Argument of latitude at t = 0."""
+
+
+class Plant(Section):
+    """The satellite."""
+
+    kind: str = "rigid"
+    inertia_kgm2: InertiaMatrix = ((2.13, 0.0, 0.0), (0.0, 3.04, 0.0), (0.0, 0.0, 3.09))
+    """3 numbers (diagonal) or 3 rows."""
+    inertia_includes_wheels: bool = False
+    """True: the wheels' spin inertia is part of inertia_kgm2."""
+    step_s: Positive = 0.05
+    """Largest integration step; lowered so that a period is a whole number of steps."""
+    gravity_gradient: bool = True
+    disturbance_Nm: Disturbance = Disturbance()
+    initial: Initial = Initial()
+    orbit: Orbit = Orbit()
+
+
+class Wheels(Section):
+    """Three reaction wheels along the body axes; one number means the same for all three."""
+
+    torque_max_Nm: LimitTriple = (0.1, 0.1, 0.1)
+    momentum_max_Nms: LimitTriple = (0.3, 0.3, 0.3)
+    inertia_kgm2: OneOrThreeNotNegative = (0.0, 0.0, 0.0)
+    """Spin inertia; 0: the momentum is just the integral of the negative torque."""
+    initial_speed_radps: OneOrThree = (0.0, 0.0, 0.0)
+    """Relative to the body; without spin inertia it carries no momentum."""
+
+
+class Actuators(Section):
+    """What turns commands into torque."""
+
+    wheels: Wheels = Wheels()
+
+
+class AttitudeSensor(Section):
+    """Euler angles of the body relative to attitude.frame."""
+
+    enabled: bool = True
+    noise_deg: NotNegative = 0.0
+    bits: Annotated[int, Field(ge=0, le=32)] = 0
+    """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
+
+
+class QuaternionSensor(Section):
+    """Star tracker: q_BN."""
+
+    enabled: bool = False
+    noise_deg: NotNegative = 0.0
+    bits: Annotated[int, Field(ge=0, le=31)] = 0
+    """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
+
+
+class RateSensor(Section):
+    """Gyros: omega_BN in body axes."""
+
+    enabled: bool = False
+    noise_degps: NotNegative = 0.0
+    lsb_degps: NotNegative = 0.0
+    """0: the wire's own, 2^-wire.rate_bits rad/s."""
+
+
+class Sensors(Section):
+    """What the board gets to see."""
+
+    attitude: AttitudeSensor = AttitudeSensor()
+    quaternion: QuaternionSensor = QuaternionSensor()
+    rate: RateSensor = RateSensor()
+
+
+class Attitude(Section):
+    """How attitude is expressed, in readings, set-points and metrics alike."""
+
+    sequence: Literal[321, 123] = 321
+    """321: R1(phi) R2(theta) R3(psi), yaw first; 123: intrinsic roll first."""
+    frame: Literal["lvlh", "inertial"] = "lvlh"
+
+
+class Law(Section):
+    """The control law on the board."""
+
+    name: str = "appc"
+    """A law of the product, or ./my_law.py:MyLaw."""
+    form: Literal["fixed", "float"] = "fixed"
+    version: int | None = None
+    """null: the newest."""
+    params: dict[str, Any] = Field(default_factory=dict)
+    """The law's own parameters; see protocol/SPEC.md for the table of each law."""
+
+
+class Row(Section):
+    """From t_s on, the set-point is attitude_deg."""
+
+    t_s: NotNegative
+    attitude_deg: Triple
+
+
+class Guidance(Section):
+    """The manoeuvre and the reference model that smooths it."""
+
+    profile: str = "A"
+    """A or B (manoeuvres of the study of paper 004), hold, steps."""
+    rows: tuple[Row, ...] = ()
+    """For profile steps: set-points in order of time; before the first it is 0."""
+    hold_deg: Triple = (0.0, 0.0, 0.0)
+    """For profile hold."""
+    reference: Literal["zoh", "paper", "none"] = "zoh"
+    """D of the reference model C1 ym = q^-d D r: (1-p)^2 (1+q^-1)/2, (1-p)^2, or no reference model."""
+    wn_radps: Positive = 0.15
+    """Natural frequency of the critically damped reference model, p = exp(-wn T_s)."""
+    rate_limit_degps: Positive | None = None
+    accel_limit_degps2: Positive | None = None
+    setpoint_source: Literal["table", "sample"] = "table"
+    """table: the board flies the rows of CONFIG; sample: it takes the set-point from each SAMPLE."""
+
+
+class Wire(Section):
+    """Fractional bits of the integers on the wire: LSB 2^-bits N m, N m s, rad/s."""
+
+    torque_bits: Annotated[int, Field(ge=8, le=30)] | None = None
+    """null: 30, lowered until the torque limit fits; 20 without a limit."""
+    momentum_bits: Annotated[int, Field(ge=8, le=30)] = 28
+    rate_bits: Annotated[int, Field(ge=8, le=30)] = 28
+
+
+class Link(Section):
+    """The cable; `link: URL` is short for its url."""
+
+    url: Url = "pty"
+    """pty, udp, inproc, udp://HOST:PORT or serial:///dev/X?baud=N"""
+    baud: Annotated[int, Field(gt=0)] | None = None
+    """Bit rate whose wire time is modelled (10 bits a byte); null: the wire takes no time."""
+
+
+class Metrics(Section):
+    """What counts."""
+
+    from_tick: Count = 0
+    diverged_deg: Positive | None = 80.0
+    """An attitude angle beyond this is a divergence (metric diverged_at_s); null: no such limit."""
+
+
+class Requirement(Section):
+    """One line of the verdict: a metric and where it has to be; exactly one of below, above, between."""
+
+    metric: str
+    below: float | None = None
+    above: float | None = None
+    between: Interval = None

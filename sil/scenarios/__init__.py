@@ -1,0 +1,33 @@
+"""The built-in scenarios: package data, found by name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+DIRECTORY = Path(__file__).resolve().parent
+
+
+class ScenarioInfo(NamedTuple):
+    """One line of `sil scenarios`."""
+
+    name: str
+    about: str
+
+
+def list_scenarios() -> tuple[ScenarioInfo, ...]:
+    """All built-in scenarios in alphabetical order."""
+    return tuple(ScenarioInfo(file.stem, _about(file)) for file in sorted(DIRECTORY.glob("*.yaml")))
+
+
+def built_in_file(name: str) -> Path | None:
+    """The file of the built-in scenario `name`, None if there is none of that name."""
+    file = DIRECTORY / f"{name}.yaml"
+    return file if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name) and file.is_file() else None
+
+
+def _about(file: Path) -> str:
+    """The value of the line `about: ...`."""
+    line = re.search(r"^about: *(.*)$", file.read_text(encoding="utf-8"), re.MULTILINE)
+    return line.group(1).strip("\"' ") if line else ""
