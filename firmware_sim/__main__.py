@@ -20,16 +20,20 @@ def main(argv: list[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
 
     from firmware_sim.board import Board
-    from firmware_sim.controllers import LawFileError, load_user_law
     from firmware_sim.hal import HostHal
     from protocol.links import LinkClosed, LinkError, open_link
     from protocol.port import Port
 
+    user_law = None
+    if options.law:
+        from firmware_sim.controllers.user import LawFileError, load_user_law
+
+        try:
+            user_law = load_user_law(options.law)
+        except LawFileError as error:
+            return _fail(str(error), 2)
     try:
-        user_law = load_user_law(options.law) if options.law else None
         link = open_link(options.link, listen=True)
-    except LawFileError as error:
-        return _fail(str(error), 2)
     except LinkError as error:
         return _fail(str(error), EXIT_LINK)
     print(f"listening {link.url}", flush=True)

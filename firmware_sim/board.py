@@ -7,6 +7,7 @@ board from any state; an unconfigured board answers anything with HELLO, which i
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeAlias
 
 from firmware_sim.flight import Flight, FlightRefused
 from firmware_sim.hal import Hal
@@ -18,6 +19,7 @@ from protocol.port import Port
 
 AHEAD_LIMIT = 4  # a SAMPLE this many ticks ahead is propagated up to; farther ahead is a bumpless re-start
 BUILD = "firmware_sim 1"
+UserLawClass: TypeAlias = tuple[LawTable, type]
 
 
 class Board:
@@ -26,7 +28,7 @@ class Board:
     user_law: table and class of a law that is not built in (`firmware_sim.controllers.user`), or None.
     """
 
-    def __init__(self, port: Port, hal: Hal, user_law: tuple[LawTable, type] | None = None) -> None:
+    def __init__(self, port: Port, hal: Hal, user_law: UserLawClass | None = None) -> None:
         self._port = port
         self._hal = hal
         self._user_law = user_law

@@ -11,11 +11,9 @@ from typing import NamedTuple
 
 from protocol import law_tables
 from protocol.law_tables import Configuration, LawTable
-from sil.profiles import setpoint_rows
 from sil.scenario import Scenario
 
 TURN_BAM = 2**32
-FULL_SCALE = 2**31 - 1
 
 Row = tuple[int, int, int, int]  # tick, x, y, z in 2^-32 turn
 
@@ -38,21 +36,21 @@ def row_at(rows: tuple[Row, ...], tick: int) -> tuple[int, int, int]:
     return rows[place - 1][1:] if place else (0, 0, 0)
 
 
-def orders(scenario: Scenario, table: LawTable) -> Orders:
+def orders(scenario: Scenario) -> Orders:
     """CONFIG of a scenario. Raises ConfigError where a value does not fit its word."""
-    period_s = scenario.period_s
+    period_s, table = scenario.period_s, scenario.law_table
     guidance, wire = scenario.guidance, scenario.wire
     limits = scenario.actuators.wheels.torque_max_Nm
     values: dict[str, law_tables.Value] = {
         "form": scenario.law.form,
-        "period_us": round(period_s * 1e6),
+        "period_us": scenario.period_us,
         "transport_delay_ticks": scenario.transport_delay_ticks,
         "hold_limit": scenario.hold_limit,
         "link_limit": scenario.link_limit,
-        "sample_timeout_us": round(scenario.sample_timeout_seconds * 1e6),
+        "sample_timeout_us": scenario.sample_timeout_us,
         "answer_delay_us": round(scenario.answer_delay_s * 1e6),
         "telemetry_every": scenario.telemetry_every,
-        "torque_bits": torque_bits(scenario),
+        "torque_bits": scenario.torque_bits,
         "momentum_bits": wire.momentum_bits,
         "rate_bits": wire.rate_bits,
         "torque_limit": tuple(math.inf if limit is None else limit for limit in limits),
@@ -61,7 +59,7 @@ def orders(scenario: Scenario, table: LawTable) -> Orders:
         "rate_limit": _bam(guidance.rate_limit_degps or 0.0, period_s),
         "accel_limit": _bam(guidance.accel_limit_degps2 or 0.0, period_s**2),
         "setpoint_source": guidance.setpoint_source,
-        **scenario.law.params,
+        **scenario.law_values(),
     }
     rows = guidance_rows(scenario) if guidance.setpoint_source == "table" else ()
     words = law_tables.config_words(table, values, rows)
@@ -70,20 +68,7 @@ def orders(scenario: Scenario, table: LawTable) -> Orders:
 
 def guidance_rows(scenario: Scenario) -> tuple[Row, ...]:
     """The named profile as (tick, x, y, z) in 2^-32 turn."""
-    return tuple(
-        (tick, *(_bam(angle, 1.0) for angle in attitude_deg)) for tick, attitude_deg in setpoint_rows(scenario)
-    )  # type: ignore[return-value]
-
-
-def torque_bits(scenario: Scenario) -> int:
-    """Fractional bits of a torque: as many as let the limit fit int32 (at most 30); 20 (+-2048 N m) without a limit."""
-    if scenario.wire.torque_bits is not None:
-        return scenario.wire.torque_bits
-    limits = scenario.actuators.wheels.torque_max_Nm
-    if None in limits:
-        return 20
-    largest = max(limit for limit in limits if limit is not None)
-    return min(30, math.floor(math.log2(FULL_SCALE / largest)))
+    return tuple((row.tick, *(_bam(angle, 1.0) for angle in row.xyz_deg)) for row in scenario.setpoints())  # type: ignore[misc]
 
 
 def _bam(angle_deg: float, factor: float) -> int:

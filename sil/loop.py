@@ -8,15 +8,21 @@ Nothing here reads a wall clock: the `Clock` says when a tick happens, tick numb
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from protocol import events
 from protocol.frames import Reading, Sample
 from sil.clock import Clock
 from sil.commands import Acting, Decides
 from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
+
+
+class PlantBroke(Exception):
+    """The plant's state is not a number at this tick."""
 
 
 class Timing(NamedTuple):
@@ -50,11 +56,13 @@ class Loop:
         commands: Decides,
         recorder: Recorder,
         clock: Clock,
+        bound_deg: float | None = None,
     ) -> None:
         self.timing, self.scales = timing, scales
         self.plant, self.actuator, self.sensors, self.setpoints = plant, actuator, sensors, setpoints
         self.board, self.commands, self.recorder, self.clock = board, commands, recorder, clock
         self.period_s = timing.period_ns * 1e-9
+        self.bound_rad = None if bound_deg is None else math.radians(bound_deg)
         self.degraded_ticks = 0
         self.lateness_ns: list[int] = []
 
@@ -64,6 +72,8 @@ class Loop:
         self.board.drain(k - 1)  # (1)
         acting = self.commands.decide(k - delay) if delay else self.commands.acting  # (2)
         motion = self.plant.motion(t_ns)
+        if not math.isfinite(sum(motion.euler_rad.tolist())):
+            raise PlantBroke(k)
         applied = self._limited(acting, motion)
         self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
         if not delay:
@@ -81,14 +91,31 @@ class Loop:
             if stop():
                 return k, "interrupted"
             self._await_tick(k)
-            motion = self.tick(k)
+            try:
+                motion = self.tick(k)
+            except PlantBroke:
+                self.recorder.event(k, events.PLANT_NAN, k, 0)
+                self.recorder.commit(k)
+                return k, "diverged"
             progress(k, motion)
-            if not np.isfinite(motion.euler_rad.sum()):
+            if self._beyond(k, motion):
+                self.recorder.commit(k)
                 return k + 1, "diverged"
         self._await_tick(self.timing.ticks)
         self.board.finish(self.timing.ticks - 1)
         self.recorder.commit(self.timing.ticks - 1)
         return self.timing.ticks, "finished"
+
+    def _beyond(self, k: int, motion: Motion) -> bool:
+        """An attitude angle beyond the scenario's bound ends the run: what follows says nothing more about the law."""
+        if self.bound_rad is None:
+            return False
+        angles = [abs(angle) for angle in motion.euler_rad.tolist()]
+        if max(angles) <= self.bound_rad:
+            return False
+        axis = angles.index(max(angles))
+        self.recorder.event(k, events.DIVERGED, axis, round(math.degrees(angles[axis]) * 1000))
+        return True
 
     def _await_tick(self, k: int) -> None:
         """Sleep to the deadline; a wake-up more than a period late moves the epoch, so ticks are never burst."""
@@ -97,6 +124,7 @@ class Loop:
         t_ns = k * self.timing.period_ns
         late_ns = self.clock.wait(t_ns, self.board.listen)
         self.lateness_ns.append(late_ns)
+        self.recorder.timing(k, late_ns)
         if late_ns > self.timing.period_ns / self.clock.scale:
             self.degraded_ticks += 1
             self.clock.rebase(t_ns)
@@ -121,7 +149,7 @@ class Loop:
         for code, a, b in self.commands.notices:
             self.recorder.event(k, code, a, b)
         self.commands.notices.clear()
-        self.recorder.truth(k, motion, applied, self.commands.acting)
+        self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
         self.recorder.commit(k)
 
 

@@ -83,7 +83,9 @@ class Recorder(Protocol):
     def event(self, tick: int, code: int, a: int, b: int) -> None:
         """Something the laboratory noticed; codes in protocol.events."""
 
-    def truth(self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int) -> None:
+    def truth(
+        self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int
+    ) -> None:
         """The plant at t_k and the torque that acts from t_k on."""
 
     def timing(self, tick: int, lateness_ns: int) -> None:

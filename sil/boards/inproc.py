@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from firmware_sim.board import Board
-from firmware_sim.controllers import LawFileError, load_user_law
+from firmware_sim.board import Board, UserLawClass
 from firmware_sim.hal import HostHal
 from protocol.links import Link, inproc
 from protocol.port import Port
@@ -15,14 +14,10 @@ class InprocBoard:
     """A `firmware_sim` board that runs until idle whenever the laboratory waits for a frame. Lockstep only."""
 
     def __init__(self, order: BoardOrder) -> None:
-        try:
-            user_law = load_user_law(order.law_file) if order.law_file else None
-        except LawFileError as error:
-            raise UsageError(str(error)) from None
         lab_end, board_end = inproc.pair()
         self.link: Link = lab_end
         self._port = Port(board_end)
-        self._board = Board(self._port, HostHal(self._port), user_law)
+        self._board = Board(self._port, HostHal(self._port), _user_law(order.law_file))
         lab_end.pump = self._run_until_idle
 
     def check_alive(self) -> None:
@@ -35,3 +30,14 @@ class InprocBoard:
     def _run_until_idle(self) -> None:
         while (packet := self._port.receive(0.0)) is not None:
             self._board.handle(packet)
+
+
+def _user_law(law_file: str) -> UserLawClass | None:
+    if not law_file:
+        return None
+    from firmware_sim.controllers.user import LawFileError, load_user_law
+
+    try:
+        return load_user_law(law_file)
+    except LawFileError as error:
+        raise UsageError(str(error)) from None

@@ -1,0 +1,190 @@
+"""Scenario to rig: who is plugged into whom. Builds plant, sensors, wheels, link, board and loop, and takes them down."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from protocol import frames
+from protocol.channel import Clear
+from protocol.law_tables import ConfigError, refusal
+from protocol.links import LinkError
+from protocol.port import Port
+from sil.actuators import ACTUATORS
+from sil.answers import Answers
+from sil.boards import BoardHost, BoardOrder, plug_in
+from sil.clock import Clock, clock_rate_q16, new_clock
+from sil.commands import CommandWindow, Decides, ExecutionModel
+from sil.configure import Orders, orders, row_at
+from sil.loop import Loop, Scales, Timing
+from sil.plants import PLANTS
+from sil.plugins import load
+from sil.scenario import Scenario
+from sil.scenario_law import is_user_law
+from sil.schedule import read_schedule
+from sil.sensors import SENSORS
+from sil.session import Session
+from sil.signals import Counterpart, Recorder, Sensor
+from sil.sinks.journal import Direction
+from sil.sinks.journal import Fate as Outcome
+from sil.trouble import LinkFailure, UsageError
+from sil.unplugged import Nobody, Scheduled
+
+Notify = Callable[[str], None]
+HELLO_WITHIN_S = 10.0
+DEAD_AFTER_S = 10.0
+
+
+@dataclass
+class Rig:
+    """A rig that is plugged together. `port`, `session`, `host`, `orders`, `answers` are None without a board."""
+
+    loop: Loop
+    clock: Clock
+    window: CommandWindow | None = None
+    port: Port | None = None
+    session: Session | None = None
+    host: BoardHost | None = None
+    orders: Orders | None = None
+    answers: Answers | None = None
+    config_packets: tuple[bytes, ...] = ()
+
+    def stop(self, reason: int) -> None:
+        """Tell the board that the session is over, and unplug. Leaves no process behind; safe to call twice."""
+        try:
+            if self.session is not None:
+                self.session.close(reason)
+        except LinkError:
+            pass  # the link may be what failed
+        finally:
+            self.session = None
+            if self.host is not None:
+                self.host.close()
+
+
+def assemble(
+    scenario: Scenario, recorder: Recorder, log: Path | None, notify: Notify, hello_within_s: float = HELLO_WITHIN_S
+) -> Rig:
+    """Build everything; with a board, the session is open and the board READY. Raises SilError with one line.
+
+    log: file for a board process's stderr. hello_within_s: how long to wait for a board that somebody else starts.
+    """
+    try:
+        clock = new_clock(scenario.clock)
+        if scenario.board == "none":
+            return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
+        return _with_board(scenario, clock, recorder, log, notify, hello_within_s)
+    except LinkError as error:
+        raise LinkFailure(str(error)) from None
+
+
+def law_orders(scenario: Scenario) -> Orders:
+    """CONFIG of the scenario, or UsageError where its law will not fly so."""
+    try:
+        made = orders(scenario)
+    except ConfigError as error:
+        raise UsageError(str(error)) from None
+    reason = refusal(made.configuration)
+    if reason is not None:
+        raise UsageError(reason)
+    return made
+
+
+def _with_board(
+    scenario: Scenario, clock: Clock, recorder: Recorder, log: Path | None, notify: Notify, hello_within_s: float
+) -> Rig:
+    made = law_orders(scenario)
+    window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
+    kind, url = board_and_link(scenario)
+    host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify))
+    rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made)  # type: ignore[arg-type]
+    try:
+        # The plant compiles or loads while the board process starts and does the same.
+        rig.port = Port(host.link)
+        rig.session = Session(rig.port, clock_rate_q16(clock), host.check_alive)
+        loop = _loop(scenario, clock, Nobody(), window, recorder, made)
+        packets = rig.session.open(made.words, made.configuration.hash, hello_within_s, notify)
+        rig.config_packets = tuple(packets)
+        rig.answers = loop.board = _answers(scenario, rig, recorder)
+        rig.loop = loop
+    except BaseException:
+        rig.stop(frames.STOP_FAILED)
+        raise
+    return rig
+
+
+def record_config(rig: Rig, recorder: Recorder, tick: int) -> None:
+    """The CONFIG packets are deterministic frames: part of the log, at the tick where their session starts."""
+    for packet in rig.config_packets:
+        recorder.packet(tick, Direction.UP, Outcome.DELIVERED, packet)
+
+
+def _answers(scenario: Scenario, rig: Rig, recorder: Recorder) -> Answers:
+    assert rig.orders is not None and rig.port is not None and rig.host is not None and rig.window is not None
+    common = rig.orders.configuration.common
+    model = ExecutionModel(scenario.period_ns, common["sample_timeout_us"] * 1000, common["answer_delay_us"] * 1000)
+    return Answers(
+        rig.port,
+        Clear(scenario.link.baud),
+        model,
+        rig.window,
+        recorder,
+        2.0 ** -common["torque_bits"],
+        lockstep=not rig.clock.paced,
+        check_alive=rig.host.check_alive,
+        dead_after_s=DEAD_AFTER_S,
+    )
+
+
+def board_and_link(scenario: Scenario) -> tuple[str, str]:
+    """(kind in BOARDS, link URL). A serial port has a board on its other end already: nobody has to be launched."""
+    if "://" in scenario.board:
+        return "wired", scenario.board
+    if scenario.board == "process" and scenario.link.url.startswith("serial:"):
+        return "wired", scenario.link.url
+    return scenario.board, scenario.link.url
+
+
+def user_law_spec(scenario: Scenario) -> str:
+    """`/abs/file.py:Class` of a user's own law, or ""."""
+    if not is_user_law(scenario.law.name):
+        return ""
+    file = scenario.file_of("law.name")
+    return f"{file.resolve()}:{scenario.law.name.rpartition(':')[2]}" if file is not None else ""
+
+
+def _scheduled(scenario: Scenario) -> Scheduled:
+    file = scenario.file_of("schedule")
+    if file is None:
+        return Scheduled(np.zeros((scenario.ticks, 3)))
+    return Scheduled(read_schedule(file, scenario.period_s, scenario.ticks))
+
+
+def _loop(
+    scenario: Scenario, clock: Clock, board: Counterpart, decides: Decides, recorder: Recorder, made: Orders | None
+) -> Loop:
+    rows = made.configuration.rows if made is not None else ()
+    delay = scenario.transport_delay_ticks if made is not None else 0
+    return Loop(
+        Timing(scenario.period_ns, delay, scenario.ticks),
+        Scales(2.0 ** -scenario.torque_bits, 2.0**-scenario.wire.momentum_bits),
+        load(PLANTS, "plant.kind", scenario.plant.kind).from_scenario(scenario),
+        load(ACTUATORS, "actuators", "wheels").from_scenario(scenario),
+        _sensors(scenario),
+        lambda tick: row_at(rows, tick),
+        board,
+        decides,
+        recorder,
+        clock,
+        scenario.metrics.diverged_deg,
+    )
+
+
+def _sensors(scenario: Scenario) -> list[Sensor]:
+    """The instruments that the scenario switches on."""
+    on = [name for name in SENSORS if getattr(scenario.sensors, name).enabled]
+    return [load(SENSORS, "sensors", name).from_scenario(scenario) for name in on]
+

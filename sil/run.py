@@ -1,0 +1,332 @@
+"""One run from scenario to verdict: run directory, journal, loop, seal, metrics, summary.json."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import signal
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from protocol import frames
+from protocol.links import LinkError
+from sil.metrics import Judgement, judge, measure
+from sil.rig import Rig, assemble, record_config
+from sil.runs import open_run
+from sil.scenario import Scenario
+from sil.scenario_law import is_user_law
+from sil.signals import Motion
+from sil.sinks.journal import Journal, JournalError
+from sil.sinks.recorder import JournalRecorder
+from sil.sinks.seal import SealReport, seal
+from sil.trouble import (
+    EXIT_INTERRUPTED,
+    EXIT_LINK,
+    EXIT_OK,
+    EXIT_REQUIREMENT,
+    LinkFailure,
+    SilError,
+    UsageError,
+)
+
+Progress = Callable[[int, int, Motion], None]
+NUMBERS_DEPEND_ON = ("numpy", "numba")
+
+
+class Watch:
+    """What a run shows of itself while it goes on; this one shows nothing. The CLI hands in one that draws."""
+
+    def note(self, line: str) -> None:
+        """Something worth a line: a board that compiles, a pty that waits for its board."""
+
+    def tick(self, tick: int, ticks: int, motion: Motion) -> None:
+        """A tick is over."""
+
+    def stage(self, name: str) -> None:
+        """`start`, `run`, `seal`."""
+
+
+def run_scenario(scenario: Scenario, out: Path | None = None, watch: Watch | None = None) -> dict[str, Any]:
+    """Run a scenario and leave a complete run directory; returns the summary, which is also in summary.json.
+
+    out: run directory, refused if it is not empty; None makes runs/NAME-NNN. SIGINT and SIGTERM end the run at the
+    next tick, with log and summary complete. Raises UsageError before anything was run; a link or board that fails
+    later is in the summary (`verdict: link_failure`, exit code 3), since what was recorded until then is kept.
+    """
+    watch = watch or Watch()
+    folder = new_run_dir(scenario.name, out)
+    try:
+        journal = Journal(folder / "run.journal")
+    except JournalError as error:
+        raise UsageError(str(error)) from None
+    recorder = JournalRecorder(journal)
+    with stop_requests() as stop:
+        try:
+            outcome = _fly(scenario, folder, recorder, stop, watch)
+        except BaseException:
+            journal.close()
+            raise
+    watch.stage("seal")
+    report = seal(folder)
+    summary = _summary(scenario, folder, outcome, report)
+    (folder / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return summary
+
+
+class Outcome:
+    """How the loop ended, before anything is read back."""
+
+    def __init__(self) -> None:
+        self.ticks = 0
+        self.reason = "failed"
+        self.failure = ""
+        self.wall_s = 0.0
+        self.start_s = 0.0
+        self.rig: Rig | None = None
+
+
+def _fly(scenario: Scenario, folder: Path, recorder: JournalRecorder, stop: Callable[[], bool], watch: Watch) -> Outcome:
+    """Assemble, loop, take down; the journal is closed with END whatever happened once it had begun."""
+    outcome = Outcome()
+    started = time.perf_counter()
+    watch.stage("start")
+    try:
+        rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note)
+    except SilError:
+        _discard(folder, recorder)
+        raise
+    recorder.start(identity(scenario, rig), host_facts(scenario, rig))
+    recorder.session(0)
+    record_config(rig, recorder, 0)
+    outcome.start_s = time.perf_counter() - started
+    watch.stage("run")
+    began = time.perf_counter()
+    try:
+        outcome.ticks, outcome.reason = rig.loop.run(stop, lambda k, motion: watch.tick(k, scenario.ticks, motion))
+    except (LinkError, LinkFailure) as error:
+        outcome.failure, outcome.ticks = str(error), rig.loop.ticks_done
+    except JournalError as error:
+        outcome.failure, outcome.ticks = str(error), rig.loop.ticks_done
+    finally:
+        outcome.wall_s = time.perf_counter() - began
+        rig.stop({"finished": frames.STOP_DONE, "interrupted": frames.STOP_INTERRUPTED}.get(outcome.reason, 2))
+        _close(recorder, outcome)
+    return outcome
+
+
+def _close(recorder: JournalRecorder, outcome: Outcome) -> None:
+    try:
+        recorder.end(max(outcome.ticks - 1, 0), outcome.reason, outcome.ticks)
+    except JournalError as error:
+        outcome.failure = outcome.failure or str(error)
+
+
+def _discard(folder: Path, recorder: JournalRecorder) -> None:
+    """Nothing was run: leave no half-made directory behind (a board's last words stay, if there are any)."""
+    recorder.close()
+    (folder / "run.journal").unlink(missing_ok=True)
+    log = folder / "board.log"
+    if log.exists() and not log.stat().st_size:
+        log.unlink()
+    if not any(folder.iterdir()):
+        folder.rmdir()
+
+
+# -- identity ------------------------------------------------------------------------------------------------------
+
+
+def identity(scenario: Scenario, rig: Rig) -> dict[str, Any]:
+    """META: everything that decides the numbers, and nothing of clock, link, board or host."""
+    meta: dict[str, Any] = {
+        "scenario": scenario.identity(),
+        "name": scenario.name,
+        "seed": scenario.seed,
+        "period_ns": scenario.period_ns,
+        "ticks": scenario.ticks,
+        "layout_hash": f"{frames.LAYOUT_HASH:08x}",
+        "versions": {"attitude-sil": version("attitude-sil")} | {name: version(name) for name in NUMBERS_DEPEND_ON},
+    }
+    if rig.orders is not None:
+        table = rig.orders.table
+        meta["law"] = {"name": table.name, "id": table.law_id, "version": table.version}
+        meta["law_table_hash"] = f"{rig.orders.configuration.hash:08x}"
+        meta["law_file_sha256"] = _law_file_sha256(scenario)
+    return meta
+
+
+def _law_file_sha256(scenario: Scenario) -> str:
+    """Of the file of a user's own law; "" for a law of the product."""
+    file = scenario.file_of("law.name") if is_user_law(scenario.law.name) else None
+    return hashlib.sha256(file.read_bytes()).hexdigest() if file is not None else ""
+
+
+def host_facts(scenario: Scenario, rig: Rig) -> dict[str, Any]:
+    """HOST: what describes this machine, link and board; timing.mcap only."""
+    board = rig.session.board if rig.session is not None else None
+    return {
+        "clock": scenario.clock,
+        "link": scenario.link.url,
+        "baud": scenario.link.baud,
+        "board": scenario.board,
+        "board_build": board.build if board is not None else "",
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "machine": platform.machine(),
+    }
+
+
+# -- run directory -------------------------------------------------------------------------------------------------
+
+
+def new_run_dir(name: str, out: Path | None) -> Path:
+    """`out`, made if it is not there and refused if it is not empty; or the next free runs/NAME-NNN."""
+    try:
+        if out is None:
+            return _next_run_dir(Path("runs"), name)
+        out.mkdir(parents=True, exist_ok=True)
+        if any(out.iterdir()):
+            raise UsageError(f"--out: expected an empty or new directory, got {out}: it is not empty")
+    except OSError as error:
+        raise UsageError(f"run directory: cannot make {error.filename or out}: {error.strerror}") from None
+    return out
+
+
+def _next_run_dir(parent: Path, name: str) -> Path:
+    parent.mkdir(exist_ok=True)
+    numbers = [int(p.name.removeprefix(f"{name}-")) for p in parent.glob(f"{name}-*") if p.name[len(name) + 1 :].isdigit()]
+    number = max(numbers, default=0)
+    while True:
+        number += 1
+        try:
+            (parent / f"{name}-{number:03d}").mkdir()
+        except FileExistsError:
+            continue  # somebody else runs the same scenario
+        return parent / f"{name}-{number:03d}"
+
+
+# -- verdict -------------------------------------------------------------------------------------------------------
+
+
+def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealReport) -> dict[str, Any]:
+    run = open_run(folder)
+    metrics = measure(run)
+    link = _link_counters(outcome.rig)
+    judgements = judge(scenario.require, {**metrics, **link}) if outcome.reason in ("finished", "diverged") else []
+    degraded = outcome.rig.loop.degraded_ticks if outcome.rig else 0
+    exit_code, verdict = _verdict(outcome, judgements, degraded, metrics)
+    window = outcome.rig.window if outcome.rig else None
+    return {
+        "verdict": verdict,
+        "exit_code": exit_code,
+        "failure": outcome.failure,
+        "scenario": scenario.name,
+        "reason": outcome.reason,
+        "ticks": outcome.ticks,
+        "duration_s": outcome.ticks * scenario.period_ns * 1e-9,
+        "metrics": _plain(metrics),
+        "require": [_plain(judgement._asdict()) for judgement in judgements],
+        "link": link,
+        "timing": _timing(scenario, outcome, report),
+        "reproducible": not (window.real_misses if window else 0),
+        "sha256": report.sha256,
+        "run_dir": str(folder),
+    }
+
+
+def _verdict(
+    outcome: Outcome, judgements: list[Judgement], degraded: int, metrics: Mapping[str, Any]
+) -> tuple[int, str]:
+    """The first line of DESIGN's table of exit codes that applies."""
+    if outcome.reason == "interrupted":
+        return EXIT_INTERRUPTED, "interrupted"
+    if outcome.failure:
+        return EXIT_LINK, "failed"
+    if degraded:
+        return EXIT_LINK, "degraded"
+    expected = any(j.metric.startswith("diverged_at_s") for j in judgements)
+    if not all(j.passed for j in judgements) or (outcome.reason == "diverged" and not expected):
+        return EXIT_REQUIREMENT, "failed"
+    return EXIT_OK, "passed"
+
+
+def _link_counters(rig: Rig | None) -> dict[str, int]:
+    if rig is None or rig.port is None or rig.window is None or rig.answers is None:
+        return {"missed": 0, "late": 0, "real_misses": 0, "overruns": 0, "crc_errors": 0, "discarded_bytes": 0}
+    counters = rig.port.counters
+    return {
+        "missed": rig.window.missed,
+        "late": rig.window.late,
+        "real_misses": rig.window.real_misses,
+        "overruns": rig.answers.overruns,
+        "crc_errors": counters.crc_errors,
+        "discarded_bytes": counters.discarded_bytes,
+    }
+
+
+def _timing(scenario: Scenario, outcome: Outcome, report: SealReport) -> dict[str, Any]:
+    simulated_s = outcome.ticks * scenario.period_ns * 1e-9
+    rig = outcome.rig
+    return {
+        "wall_s": outcome.wall_s,
+        "start_s": outcome.start_s,
+        "seal_s": report.wall_s,
+        "times_real_time": simulated_s / outcome.wall_s if outcome.wall_s > 0 else 0.0,
+        "wakeup_us": percentiles_us(rig.loop.lateness_ns if rig else []),
+        "answer_us": percentiles_us(rig.answers.answer_ns if rig and rig.answers else []),
+        "degraded_ticks": rig.loop.degraded_ticks if rig else 0,
+    }
+
+
+def percentiles_us(times_ns: list[int]) -> dict[str, float | None]:
+    """p50, p99, p99.9 and max of times in ns, as us; None where nothing was measured (lockstep has no wake-ups)."""
+    names = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
+    if not times_ns:
+        return dict.fromkeys(names)
+    values = np.percentile(np.array(times_ns) * 1e-3, list(names.values()))
+    return {name: round(float(value), 3) for name, value in zip(names, values, strict=True)}
+
+
+def _plain(value: Any) -> Any:
+    """JSON has no NaN: it becomes null; arrays and tuples become lists."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, float | np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
+
+
+# -- signals -------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def stop_requests() -> Iterator[Callable[[], bool]]:
+    """SIGINT and SIGTERM set a flag that the loop looks at each tick; a second one interrupts at once.
+
+    Outside the main thread Python installs no handlers; then the flag stays down.
+    """
+    asked: list[int] = []
+
+    def ask(number: int, _: object) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(number)
+
+    try:
+        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    except ValueError:
+        before = {}
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
