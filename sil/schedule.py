@@ -18,7 +18,7 @@ from sil.commands import Acting
 from sil.scenario_errors import Problem, ScenarioInvalid
 
 if TYPE_CHECKING:
-    from _csv import _reader as Reader
+    from _csv import Reader
 
 COLUMNS = ("t", "u1", "u2", "u3")
 

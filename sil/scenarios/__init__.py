@@ -18,7 +18,9 @@ class ScenarioInfo(NamedTuple):
 
 def list_scenarios() -> tuple[ScenarioInfo, ...]:
     """All built-in scenarios in alphabetical order."""
-    return tuple(ScenarioInfo(file.stem, _about(file)) for file in sorted(DIRECTORY.glob("*.yaml")))
+    return tuple(
+        ScenarioInfo(file.stem, _about(file)) for file in sorted(DIRECTORY.glob("*.yaml"), key=lambda each: each.stem)
+    )
 
 
 def built_in_file(name: str) -> Path | None:
