@@ -1,4 +1,4 @@
-"""A torque schedule from CSV in place of commands, and nobody in place of a board: the plant alone.
+"""A torque schedule from CSV: the plant alone, without a board.
 
 Columns t, u1, u2, u3 (others are ignored): from t seconds on, u_i in N m is the motor torque ON wheel i, so the body
 gets -u_i. A row takes effect at the first tick not before its time and holds until the next; zero before the first.
@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import csv
 import math
-from bisect import bisect_right
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from protocol.frames import FRESH, NO_TICK, ZERO, Sample
-from sil.commands import Acting
+import numpy as np
+
 from sil.scenario_errors import Problem, ScenarioInvalid
+from sil.signals import Vector
 
 if TYPE_CHECKING:
     from _csv import Reader
@@ -25,51 +24,16 @@ COLUMNS = ("t", "u1", "u2", "u3")
 Row = tuple[float, float, float, float]  # t_s, motor torque on the wheels in N m
 
 
-class Nobody:
-    """The counterpart of a plant without a board: takes everything, answers nothing."""
-
-    def send(self, sample: Sample, t_ns: int) -> None:
-        """Nobody reads it."""
-
-    def drain(self, tick: int) -> None:
-        """Nothing ever comes."""
-
-    def listen(self, timeout_s: float) -> None:
-        """Nothing ever comes."""
-
-    def finish(self, tick: int) -> None:
-        """Nothing is open."""
-
-
-class Schedule:
-    """Decides by the rows of a schedule; without rows the torque is zero for ever."""
-
-    def __init__(self, rows: Sequence[Row], period_s: float) -> None:
-        self._ticks = [math.ceil(row[0] / period_s - 1e-9) for row in rows]
-        self._torques = [(-row[1], -row[2], -row[3]) for row in rows]
-        self._acting = Acting((0.0, 0.0, 0.0), ZERO, NO_TICK)
-        self.notices: list[tuple[int, int, int]] = []
-
-    @property
-    def acting(self) -> Acting:
-        """The last decision."""
-        return self._acting
-
-    def decide(self, due: int) -> Acting:
-        """The torque on the body from tick `due` on."""
-        place = bisect_right(self._ticks, due)
-        if place:
-            self._acting = Acting(self._torques[place - 1], FRESH, NO_TICK)
-        return self._acting
-
-
-def read_schedule(file: Path) -> list[Row]:
-    """All rows of a schedule; raises ScenarioInvalid with file and line."""
+def read_schedule(file: Path, period_s: float, ticks: int) -> Vector:
+    """Torque on the body (ticks, 3) in N m, row k acting on [t_k, t_k+1); raises ScenarioInvalid with file and line."""
     try:
         with file.open(newline="", encoding="utf-8") as text:
-            return _rows(file, csv.reader(text))
+            rows = np.array([(0.0, 0.0, 0.0, 0.0), *_rows(file, csv.reader(text))])
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ScenarioInvalid([Problem(str(file), "schedule", "a readable CSV file", str(error))]) from None
+    starts = np.concatenate([[-1.0], np.ceil(rows[1:, 0] / period_s - 1e-9)])  # tick at which a row takes over
+    torque_B: Vector = -rows[np.searchsorted(starts, np.arange(ticks), side="right") - 1, 1:]
+    return torque_B
 
 
 def _rows(file: Path, reader: Reader) -> list[Row]:

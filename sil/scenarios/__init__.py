@@ -18,9 +18,8 @@ class ScenarioInfo(NamedTuple):
 
 def list_scenarios() -> tuple[ScenarioInfo, ...]:
     """All built-in scenarios in alphabetical order."""
-    return tuple(
-        ScenarioInfo(file.stem, _about(file)) for file in sorted(DIRECTORY.glob("*.yaml"), key=lambda each: each.stem)
-    )
+    files = sorted(DIRECTORY.glob("*.yaml"), key=lambda file: file.stem)
+    return tuple(ScenarioInfo(file.stem, _about(file)) for file in files)
 
 
 def built_in_file(name: str) -> Path | None:
