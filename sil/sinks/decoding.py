@@ -56,6 +56,14 @@ class Decoder:
         self.words.update(enumerate(frame.words, frame.offset))
         self._take_bits()
 
+    def named_words(self) -> dict[str, int | list[int]]:
+        """COMMON's words by name, and all words in order under `words`."""
+        named: dict[str, int | list[int]] = {
+            word.name: self.words[i] for i, word in enumerate(COMMON) if i in self.words
+        }
+        named["words"] = [self.words[i] for i in sorted(self.words)]
+        return named
+
     def command(self, frame: Command, fate: int) -> bytes:
         """The /command row."""
         tick, (x, y, z), flags, follows, used = frame

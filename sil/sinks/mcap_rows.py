@@ -57,7 +57,9 @@ class RunRows:
             self._writer.add_attachment(0, 0, "scenario.json", "application/json", text.encode())
 
     def end(self, content: Mapping[str, Any]) -> None:
-        """END: metadata `end`."""
+        """Metadata `config`: the words that the board was sent; metadata `end`: END."""
+        if self._decoder.words:
+            self._writer.add_metadata("config", _texts(self._decoder.named_words()))
         self._writer.add_metadata("end", _texts(content))
 
     # -- one tick ------------------------------------------------------------------------------------------------
@@ -207,8 +209,19 @@ def _register(writer: Writer, topics: Any, metadata: dict[str, str] | None = Non
 
 
 def _texts(content: Mapping[str, Any]) -> dict[str, str]:
-    """MCAP metadata is text to text: everything but text becomes canonical JSON, keys sorted."""
-    return {
-        key: value if isinstance(value, str) else json.dumps(value, sort_keys=True, ensure_ascii=False)
-        for key, value in sorted(content.items())
-    }
+    """MCAP metadata is text to text: values become canonical JSON, except text that cannot be taken for JSON."""
+    return {key: value if _is_plain(value) else _json(value) for key, value in sorted(content.items())}
+
+
+def _is_plain(value: Any) -> bool:
+    if not isinstance(value, str):
+        return False
+    try:
+        json.loads(value)
+    except ValueError:
+        return True
+    return False
+
+
+def _json(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, ensure_ascii=False)

@@ -78,7 +78,7 @@ class Script:
         self.y = [math.radians(a) for a in START_DEG]
         self.w = [0.0] * 3
         self.h = [0.0] * 3
-        self.ref = list(self.y)
+        self.ref = [bam(y) * BAM_RAD for y in self.y]  # the first reading
         self.rate = [0.0] * 3
         self.accel = [0.0] * 3
         self.u = (0, 0, 0)
@@ -163,16 +163,21 @@ class Script:
             self.y[i] += self.w[i] * PERIOD_S + accel * PERIOD_S**2 / 2
             self.w[i] += accel * PERIOD_S
             self.h[i] -= torque[i] * TORQUE_LSB * PERIOD_S
-        self.advance(r)
+        self.advance(k, r)
         if k not in self.lose and k not in self.late:
             self.acting = (self.next_torque, frames.FRESH, k)
         elif self.acting[1] != frames.ZERO:
             self.acting = (self.acting[0], frames.HELD, self.acting[2])
 
-    def advance(self, r: tuple[int, int, int]) -> None:
-        """zoh reference, lead 2: what r(k) decides acts between k+1 and k+2."""
+    def advance(self, k: int, r: tuple[int, int, int]) -> None:
+        """zoh reference, lead 2: what r(k) decides acts between k+1 and k+2; at its start ym(1) = ym(0)."""
         k1, k2 = (1 - POLE) ** 2, (1 - POLE) * (3 + POLE) / 2
         for i in range(3):
+            if k == RESTART_TICK:
+                error = r[i] * BAM_RAD - self.ref[i]
+                self.rate[i] = 2 * ((1 - POLE) / (1 + POLE)) ** 2 * error
+                self.accel[i] = k1 * error - k2 * self.rate[i]
+                continue
             a = self.accel[i]
             self.ref[i] += self.rate[i] + a / 2
             self.rate[i] += a

@@ -1,0 +1,395 @@
+"""A finished run as numpy arrays by name: `run = open_run("runs/mrac-rs232-001"); run["phi_deg"]`.
+
+One row per tick k at t_k = k T_s. Axes x, y, z are the body's (roll, pitch, yaw); angles are those of the scenario's
+`attitude.sequence` relative to `attitude.frame`.
+
+| name | unit | what |
+|---|---|---|
+| tick, t_s | 1, s | tick number and simulation time |
+| phi_deg theta_deg psi_deg | deg | true attitude at the tick, not the reading |
+| ref_phi_deg ref_theta_deg ref_psi_deg | deg | reference, recomputed here in float64 (sil.reference) |
+| command_x_Nm command_y_Nm command_z_Nm | N m | torque computed at this tick; NaN where no COMMAND came |
+| applied_x_Nm applied_y_Nm applied_z_Nm | N m | torque acting on the body from this tick on, after limits |
+| w_x_radps w_y_radps w_z_radps | rad/s | body rate omega_BN, body axes |
+| h_x_Nms h_y_Nms h_z_Nms | N m s | absolute wheel momentum, body axes |
+| q_s q_x q_y q_z | 1 | attitude in inertial space, v_N = q v_B q*, scalar first, sign continuous |
+
+As triples (N, 3): `attitude_deg`, `reference_deg`, `error_deg` = attitude - reference modulo a turn, `setpoint_deg`,
+`setpoint_error_deg`, `command_Nm`, `applied_Nm`, `omega_radps`, `momentum_Nms`; (N, 4): `q_BN`.
+TELEMETRY by the names of the law's table, such as `g_x`, `trace_y`, `a1_z`: NaN at ticks without; `run.telemetry` has
+all of them, `run.units` every unit. Angles in TELEMETRY are in deg.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from protocol.law_tables import COMMON
+from sil import mcap_file
+from sil.reference import Start, model_of, recompute
+from sil.sinks import events as event_texts
+from sil.sinks import layouts
+from sil.sinks.journal import Fate
+
+Array = npt.NDArray[Any]
+ANGLES = ("phi", "theta", "psi")
+AXES = ("x", "y", "z")
+COLUMNS: dict[str, str] = {
+    "tick": "1",
+    "t_s": "s",
+    **{f"{a}_deg": "deg" for a in ANGLES},
+    **{f"ref_{a}_deg": "deg" for a in ANGLES},
+    **{f"command_{a}_Nm": "N m" for a in AXES},
+    **{f"applied_{a}_Nm": "N m" for a in AXES},
+    **{f"w_{a}_radps": "rad/s" for a in AXES},
+    **{f"h_{a}_Nms": "N m s" for a in AXES},
+    **{f"q_{a}": "1" for a in ("s", *AXES)},
+}
+TRIPLES = {
+    "attitude_deg": "deg",
+    "reference_deg": "deg",
+    "error_deg": "deg",
+    "setpoint_deg": "deg",
+    "setpoint_error_deg": "deg",
+    "command_Nm": "N m",
+    "applied_Nm": "N m",
+    "omega_radps": "rad/s",
+    "momentum_Nms": "N m s",
+    "q_BN": "1",
+}
+_PARTS: dict[str, tuple[str, int]] = {
+    **{f"{a}_deg": ("attitude_deg", i) for i, a in enumerate(ANGLES)},
+    **{f"ref_{a}_deg": ("reference_deg", i) for i, a in enumerate(ANGLES)},
+    **{f"command_{a}_Nm": ("command_Nm", i) for i, a in enumerate(AXES)},
+    **{f"applied_{a}_Nm": ("applied_Nm", i) for i, a in enumerate(AXES)},
+    **{f"w_{a}_radps": ("omega_radps", i) for i, a in enumerate(AXES)},
+    **{f"h_{a}_Nms": ("momentum_Nms", i) for i, a in enumerate(AXES)},
+    **{f"q_{a}": ("q_BN", i) for i, a in enumerate(("s", *AXES))},
+}
+_OPENED = ("/truth", "/command", "/telemetry", "/event", "/session")
+_REFERENCE_RESTART = 7
+_RAD = np.pi / 180.0
+
+
+class RunError(Exception):
+    """The run cannot be read: one line that names the file."""
+
+
+class EventRow(NamedTuple):
+    """One event; origin `board` or `laboratory`."""
+
+    tick: int
+    t_s: float
+    code: int
+    origin: str
+    a: int
+    b: int
+    text: str
+
+
+class PacketRow(NamedTuple):
+    """One deterministic frame of the log, in recorded order (tick, direction, type, sequence)."""
+
+    tick: int  # the tick it is filed under; CONFIG: its session's first
+    direction: str  # up (to the board) or down
+    type: int
+    sequence: int
+    fate: str  # delivered, late, dropped, corrupted, in_flight
+    packet: bytes  # header to CRC
+    encoded: bytes  # bytes on the wire where a byte fault altered them, else empty
+
+
+class Run:
+    """A run that was read back; see the module's first lines for names and units. `run[name]`, `run.names`.
+
+    path: the MCAP file; directory: where it lies. meta: what decides the numbers (`period_ns`, `seed`, `versions`,
+    ...). scenario: the resolved scenario without clock, link, board, out. end: {"reason", "ticks"}. summary: content
+    of summary.json beside the log, {} without. sessions: ticks at which board sessions started. commands: all COMMAND
+    rows as a structured array (sil.sinks.layouts.COMMAND).
+    """
+
+    def __init__(self, path: Path, content: mcap_file.Content) -> None:
+        self.path = path
+        self.directory = path.parent
+        self.meta = _parsed(content.metadata["run"])
+        self.end = _parsed(content.metadata.get("end", {"reason": "truncated", "ticks": "0"}))
+        self.config_words = _parsed(content.metadata.get("config", {}))
+        self.scenario: dict[str, Any] = json.loads(content.attachments.get("scenario.json", b"{}"))
+        self.name = str(self.meta.get("name", path.parent.name))
+        self.period_ns = int(self.meta["period_ns"])
+        self.period_s = self.period_ns * 1e-9
+        self.truth = _rows(content, "/truth", layouts.TRUTH)
+        self.commands = _rows(content, "/command", layouts.COMMAND)
+        self.sessions = [int(row["tick"]) for row in _rows(content, "/session", layouts.SESSION)]
+        self._events = _rows(content, "/event", layouts.EVENT)
+        self._columns = self._from_truth() | self._from_commands()
+        self.telemetry, telemetry_units = self._from_telemetry(content)
+        self.units: dict[str, str] = COLUMNS | TRIPLES | telemetry_units
+
+    # -- by name -------------------------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> list[str]:
+        """Everything that run[name] knows."""
+        return list(self.units)
+
+    def __getitem__(self, name: str) -> Array:
+        if name in _PARTS:
+            whole, column = _PARTS[name]
+            return np.asarray(self[whole][:, column])
+        if name in self._columns:
+            return self._columns[name]
+        if name in self.telemetry:
+            return self.telemetry[name]
+        if name in ("reference_deg", "error_deg", "setpoint_error_deg"):
+            return np.asarray(getattr(self, f"_{name}"))
+        raise KeyError(f"{name!r} is not in this run; known: {', '.join(self.names)}")
+
+    def __len__(self) -> int:
+        return len(self.truth)
+
+    @property
+    def tick(self) -> Array:
+        """(N,) tick numbers."""
+        return self["tick"]
+
+    @property
+    def t_s(self) -> Array:
+        """(N,) simulation time, s."""
+        return self["t_s"]
+
+    @property
+    def attitude_deg(self) -> Array:
+        """(N, 3) true attitude angles, deg."""
+        return self["attitude_deg"]
+
+    @property
+    def reference_deg(self) -> Array:
+        """(N, 3) recomputed reference, deg; NaN where there is none."""
+        return self["reference_deg"]
+
+    @property
+    def error_deg(self) -> Array:
+        """(N, 3) attitude - reference, deg."""
+        return self["error_deg"]
+
+    @property
+    def setpoint_deg(self) -> Array:
+        """(N, 3) set-point, deg."""
+        return self["setpoint_deg"]
+
+    @property
+    def setpoint_error_deg(self) -> Array:
+        """(N, 3) attitude - set-point, deg."""
+        return self["setpoint_error_deg"]
+
+    @property
+    def command_Nm(self) -> Array:
+        """(N, 3) torque computed at the tick, N m; NaN where no COMMAND came."""
+        return self["command_Nm"]
+
+    @property
+    def applied_Nm(self) -> Array:
+        """(N, 3) torque acting from the tick on, N m."""
+        return self["applied_Nm"]
+
+    @property
+    def momentum_Nms(self) -> Array:
+        """(N, 3) absolute wheel momentum, N m s."""
+        return self["momentum_Nms"]
+
+    # -- rows ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def events(self) -> list[EventRow]:
+        """All events in the order of the log."""
+        return [
+            EventRow(
+                int(tick), tick * self.period_s, int(code), ("laboratory", "board")[origin], int(a), int(b),
+                event_texts.describe(int(code), int(a), int(b))[1],
+            )
+            for tick, a, b, code, origin in self._events.tolist()
+        ]  # fmt: skip
+
+    @cached_property
+    def packets(self) -> list[PacketRow]:
+        """All deterministic frames in the order of the log (read when first asked for)."""
+        content = _read(self.path, ("/packet/up", "/packet/down"))
+        rows = []
+        for direction in ("up", "down"):
+            for message in content.messages[f"/packet/{direction}"]:
+                _, sequence, type_, fate, packet, encoded = layouts.PACKET.unpack(message[1])
+                tick = message[0] // self.period_ns
+                rows.append(PacketRow(tick, direction, type_, sequence, Fate(fate).name.lower(), packet, encoded))
+        return sorted(rows, key=lambda row: row.tick)  # stable: up before down, then as written
+
+    @cached_property
+    def samples(self) -> Array:
+        """All SAMPLE rows as a structured array (sil.sinks.layouts.SAMPLE; read when first asked for)."""
+        return _rows(_read(self.path, ("/sample",)), "/sample", layouts.SAMPLE)
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """summary.json beside the log; {} where there is none or it is not JSON."""
+        try:
+            content = json.loads((self.directory / "summary.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return content if isinstance(content, dict) else {}
+
+    # -- columns -------------------------------------------------------------------------------------------------
+
+    def _from_truth(self) -> dict[str, Array]:
+        truth = self.truth
+        ticks = truth["tick"].astype(np.int64)
+        return {
+            "tick": ticks,
+            "t_s": ticks * self.period_s if self.period_ns % 1_000_000 else ticks * (self.period_ns // 1_000_000) / 1e3,
+            "attitude_deg": truth["euler_deg"],
+            "setpoint_deg": truth["setpoint_deg"],
+            "applied_Nm": truth["applied_nm"],
+            "omega_radps": truth["omega_bn_b_radps"],
+            "momentum_Nms": truth["momentum_nms"],
+            "q_BN": _continuous(truth["q_bn"]),
+        }
+
+    def _from_commands(self) -> dict[str, Array]:
+        came = ~np.isin(self.commands["fate"], (Fate.DROPPED, Fate.CORRUPTED))
+        rows = self.commands[came]
+        return {"command_Nm": self._aligned(rows["tick"], rows["torque_nm"])}
+
+    def _from_telemetry(self, content: mcap_file.Content) -> tuple[dict[str, Array], dict[str, str]]:
+        channel = content.channels.get("/telemetry")
+        if channel is None:
+            return {}, {}
+        try:
+            names = json.loads(channel.metadata["names"])
+            units = json.loads(channel.metadata["units"])
+        except (KeyError, ValueError) as error:
+            raise RunError(f"{self.path}: /telemetry does not say what its words are ({error})") from error
+        layout = layouts.telemetry(channel.metadata.get("law", ""), [(name, units[name]) for name in names])
+        rows = _rows(content, "/telemetry", layout)
+        columns = zip(names, layout.fields, strict=False)
+        return {name: self._aligned(rows["tick"], rows[field.name]) for name, field in columns}, units
+
+    def _aligned(self, ticks: Array, values: Array) -> Array:
+        """Values by row: those of the row's tick, the first where there are several; NaN where there are none."""
+        result = np.full((len(self.truth), *values.shape[1:]), np.nan)
+        rows = np.searchsorted(self.truth["tick"], ticks)
+        known = rows < len(result)
+        known[known] &= self.truth["tick"][rows[known]] == ticks[known]
+        result[rows[known][::-1]] = values[known][::-1]
+        return result
+
+    # -- reference -----------------------------------------------------------------------------------------------
+
+    def reported(self, name: str) -> Array:
+        """(N, 3) of a TELEMETRY triple such as `reference`, `reference_rate`, `setpoint`; NaN where there was none."""
+        if f"{name}_x" not in self.telemetry:
+            return np.full((len(self), 3), np.nan)
+        return np.column_stack([self.telemetry[f"{name}_{axis}"] for axis in AXES])
+
+    @cached_property
+    def _reference_deg(self) -> Array:
+        words = self.config_words
+        if not all(word.name in words for word in COMMON):
+            return np.full((len(self), 3), np.nan)
+        first = int(self.truth["tick"][0]) if len(self) else 0
+        starts = sorted({
+            (int(row["tick"]) - first, bool(row["b"]))
+            for row in self._events
+            if row["code"] == _REFERENCE_RESTART and row["origin"] == 1 and int(row["tick"]) >= first
+        })  # fmt: skip
+        reported, rate = self.reported("reference") * _RAD, self.reported("reference_rate") * _RAD
+        made = recompute(model_of(words), self._guided_deg() * _RAD, reported, rate, [Start(*s) for s in starts])
+        return np.asarray(made / _RAD)
+
+    def _guided_deg(self) -> Array:
+        """The set-point the board had: the laboratory's; where it comes by SAMPLE, the one TELEMETRY says arrived."""
+        ours = self["setpoint_deg"]
+        arrived = self.reported("setpoint")
+        if not self.config_words.get("setpoint_source"):
+            return ours
+        return np.where(np.isfinite(arrived), arrived, ours)
+
+    @cached_property
+    def _error_deg(self) -> Array:
+        return wrapped_deg(self["attitude_deg"] - self["reference_deg"])
+
+    @cached_property
+    def _setpoint_error_deg(self) -> Array:
+        return wrapped_deg(self["attitude_deg"] - self["setpoint_deg"])
+
+
+def open_run(path: str | os.PathLike[str]) -> Run:
+    """Read a run: a run directory or an .mcap file. Every CRC is checked.
+
+    Raises RunError, one line: no such run, not sealed yet, empty, cut off, corrupt, not MCAP, somebody else's MCAP.
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = _log_of(file)
+    content = _read(file, _OPENED)
+    if "run" not in content.metadata or "/truth" not in content.channels:
+        raise RunError(f"{file}: an MCAP log (of {content.library or 'unknown origin'}), but not one of a run")
+    try:
+        return Run(file, content)
+    except (KeyError, ValueError, IndexError) as error:
+        raise RunError(f"{file}: written by another version, or damaged: {error!r}") from error
+
+
+def wrapped_deg(angle: Array) -> Array:
+    """Modulo 360 deg, in [-180, 180]; unchanged where it is there already."""
+    return np.where(np.abs(angle) <= 180.0, angle, angle - 360.0 * np.floor(angle / 360.0 + 0.5))
+
+
+def _log_of(folder: Path) -> Path:
+    log = folder / "run.mcap"
+    if log.exists():
+        return log
+    if (folder / "run.journal").exists():
+        raise RunError(f"{folder}: no run.mcap yet; `sil recover {folder}` makes it from run.journal")
+    raise RunError(f"{folder}: expected a run directory, found neither run.mcap nor run.journal in it")
+
+
+def _read(path: Path, topics: tuple[str, ...]) -> mcap_file.Content:
+    try:
+        return mcap_file.read(path, topics)
+    except OSError as error:
+        raise RunError(f"{path}: {error.strerror or error}") from error
+    except mcap_file.McapError as error:
+        raise RunError(f"{path}: {error}") from error
+
+
+def _rows(content: mcap_file.Content, topic: str, layout: layouts.Layout) -> Array:
+    start = len(layouts.CDR_HEADER)
+    data = b"".join([message[1][start:] for message in content.messages.get(topic, ())])
+    return np.frombuffer(data, layout.dtype)
+
+
+def _parsed(texts: Mapping[str, str]) -> dict[str, Any]:
+    """Metadata values: JSON where they are JSON, else the text itself."""
+    result: dict[str, Any] = {}
+    for key, value in texts.items():
+        try:
+            result[key] = json.loads(value)
+        except ValueError:
+            result[key] = value
+    return result
+
+
+def _continuous(q: Array) -> Array:
+    """The same rotations with signs such that neighbours have a positive scalar product."""
+    if len(q) < 2:
+        return q
+    flips = np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0)
+    signs = np.concatenate(([1.0], np.cumprod(flips)))
+    return q if (signs > 0).all() else q * signs[:, None]
