@@ -1,0 +1,94 @@
+"""EVENT codes: number, name and the meaning of the two integers. Below 0x100 the board's, from there the laboratory's.
+
+Board events are frames; laboratory events never cross the wire, but are recorded beside them and so share the numbers.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+SAMPLE_LOST = 0x0001
+OVERRUN = 0x0002
+STALE_SAMPLE = 0x0003
+RESTARTED = 0x0004
+WATCHDOG_ON = 0x0005
+WATCHDOG_OFF = 0x0006
+REFERENCE_RESTART = 0x0007
+ARITHMETIC_SATURATION = 0x0008
+NAN = 0x0009
+READING_INVALID = 0x000A
+IDENTIFICATION_PAUSED = 0x000B
+IDENTIFICATION_RESUMED = 0x000C
+LAW_ERROR = 0x000D
+
+COMMAND_LATE = 0x0100
+COMMAND_MISSED = 0x0101
+HOLD_LIMIT = 0x0102
+RECOVERED = 0x0103
+REAL_MISS = 0x0104
+PLANT_NAN = 0x0105
+TORQUE_LIMIT = 0x0106
+MOMENTUM_LIMIT = 0x0107
+EPOCH_REBASED = 0x0108
+BOARD_RESTARTED = 0x0109
+DIVERGED = 0x010A
+FRAME_LOST = 0x010B
+UNEXPECTED_FRAME = 0x010C
+
+FIRST_LAB_CODE = 0x0100
+
+
+class EventKind(NamedTuple):
+    """One code: its name and what the numbers a and b say ("" when they are 0)."""
+
+    code: int
+    name: str
+    about: str
+    a: str
+    b: str
+
+
+_KINDS = (
+    EventKind(SAMPLE_LOST, "SAMPLE_LOST", "tick stepped without a usable SAMPLE", "tick", "samples lost so far"),
+    EventKind(OVERRUN, "OVERRUN", "the SAMPLE came while the board was busy", "tick", "overruns so far"),
+    EventKind(STALE_SAMPLE, "STALE_SAMPLE", "SAMPLE of a tick already stepped, dropped", "its tick", "dropped so far"),
+    EventKind(RESTARTED, "RESTARTED", "too far ahead: bumpless re-start", "tick expected", "tick that came"),
+    EventKind(WATCHDOG_ON, "WATCHDOG_ON", "link watchdog: torque is zero from here", "tick", "ticks without a SAMPLE"),
+    EventKind(WATCHDOG_OFF, "WATCHDOG_OFF", "a SAMPLE came: the law commands again", "tick", ""),
+    EventKind(
+        REFERENCE_RESTART, "REFERENCE_RESTART", "reference model began anew", "axis mask, bit 0 = x", "1 at the start"
+    ),
+    EventKind(
+        ARITHMETIC_SATURATION,
+        "ARITHMETIC_SATURATION",
+        "a fixed-point operation of the law saturated",
+        "axis mask, 0 unknown",
+        "so far",
+    ),
+    EventKind(NAN, "NAN", "the law's torque was not a number; it is zero", "axis 0, 1, 2", ""),
+    EventKind(READING_INVALID, "READING_INVALID", "a reading the law needs is invalid", "needed mask", "valid"),
+    EventKind(IDENTIFICATION_PAUSED, "IDENTIFICATION_PAUSED", "identification stands still", "tick", ""),
+    EventKind(IDENTIFICATION_RESUMED, "IDENTIFICATION_RESUMED", "three good samples: it goes on", "tick", ""),
+    EventKind(LAW_ERROR, "LAW_ERROR", "the law raised an error; the command is zero", "tick", ""),
+    EventKind(COMMAND_LATE, "COMMAND_LATE", "a COMMAND came after its tick, dropped", "its tick", "us late"),
+    EventKind(COMMAND_MISSED, "COMMAND_MISSED", "no command in time for this tick", "its tick", "misses in a row"),
+    EventKind(HOLD_LIMIT, "HOLD_LIMIT", "held too long: zero torque", "tick of the last command", "misses in a row"),
+    EventKind(RECOVERED, "RECOVERED", "a good command after misses", "its tick", "misses before it"),
+    EventKind(REAL_MISS, "REAL_MISS", "late on the clock though in time by the model", "tick", "us late"),
+    EventKind(PLANT_NAN, "PLANT_NAN", "the plant's state is not a number", "tick", ""),
+    EventKind(TORQUE_LIMIT, "TORQUE_LIMIT", "actuator torque at its limit", "axis mask", "ticks so far"),
+    EventKind(MOMENTUM_LIMIT, "MOMENTUM_LIMIT", "wheel momentum at its limit", "axis mask", "ticks so far"),
+    EventKind(EPOCH_REBASED, "EPOCH_REBASED", "woke more than a period late: the epoch moved", "tick", "us"),
+    EventKind(BOARD_RESTARTED, "BOARD_RESTARTED", "the board answered with HELLO within a session", "tick", ""),
+    EventKind(DIVERGED, "DIVERGED", "attitude beyond the scenario's bound", "axis 0, 1, 2", "angle in 1e-3 deg"),
+    EventKind(FRAME_LOST, "FRAME_LOST", "the channel model lost or damaged a frame", "frame type", "tick"),
+    EventKind(UNEXPECTED_FRAME, "UNEXPECTED_FRAME", "a frame out of place in this state", "frame type", "its tick"),
+)
+
+EVENTS = {kind.code: kind for kind in _KINDS}
+
+
+def name_of(code: int) -> str:
+    """The name of a code, or its number when it is unknown."""
+    kind = EVENTS.get(code)
+    return kind.name if kind else f"0x{code:04X}"

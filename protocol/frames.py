@@ -1,0 +1,446 @@
+"""All frames: one NamedTuple per type, `pack` to a packet (header, body, CRC-32) and `unpack` from one.
+
+Layouts, units and the layout hash L come from `layouts.py`; SPEC.md says what every field means.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
+
+from protocol.layouts import HEADER, HEADER_SIZE, LAYOUT_BY_TYPE, MAX_BODY, READINGS, size_of, struct_format
+from protocol.layouts import LAYOUT_HASH as LAYOUT_HASH
+from protocol.layouts import MAX_PACKET as MAX_PACKET
+from protocol.layouts import MIN_PACKET as MIN_PACKET
+from protocol.layouts import Type as Type
+from protocol.refusals import BadCrc, BadLength, BadValue, BadVersion, CannotPack, TooLong, TooShort, UnknownType
+from protocol.refusals import BadPacket as BadPacket
+
+PROTOCOL_VERSION = 1
+NO_TICK = 0xFFFFFFFF
+HOUSEKEEPING = 0x80
+
+ZERO, FRESH, HELD = 0, 1, 2  # Sample.source
+USED, PROPAGATED, REPEATED, RESTARTED = 1, 2, 3, 4  # Command.used
+FLAG_SATURATED = 1 << 0  # torque at its limit
+FLAG_WATCHDOG = 1 << 1  # link watchdog: torque is zero
+FLAG_IDENTIFICATION_PAUSED = 1 << 2
+FLAG_ARITHMETIC = 1 << 3  # arithmetic saturation in the law
+FLAG_OVERRUN = 1 << 4  # this tick's SAMPLE found the board busy
+FLAG_STARTING = 1 << 5  # law not yet in control
+EULER, QUATERNION, RATE = 1 << 0, 1 << 1, 1 << 2  # Sample present and valid masks, readings_mask
+ROLE_LAB, ROLE_BOARD = 0, 1
+HELLO_OWN_TIMER, HELLO_CONFIGURED, HELLO_ECHO = 1 << 0, 1 << 1, 1 << 2
+READY_OK, READY_BAD_WORD, READY_UNKNOWN_LAW, READY_LAW_REFUSES, READY_MISSING_PARTS = 0, 1, 2, 3, 4
+NO_INDEX = 0xFFFF
+STOP_DONE, STOP_INTERRUPTED, STOP_FAILED = 0, 1, 2
+MAX_CONFIG_WORDS = (MAX_BODY - size_of(LAYOUT_BY_TYPE[Type.CONFIG].fields)) // 4
+MAX_TELEMETRY_WORDS = (MAX_BODY - size_of(LAYOUT_BY_TYPE[Type.TELEMETRY].fields)) // 4
+
+Triple: TypeAlias = tuple[int, int, int]
+
+
+class Config(NamedTuple):
+    """One part of the CONFIG words: words[offset], words[offset + 1], ... of `parts` parts."""
+
+    part: int
+    parts: int
+    offset: int
+    words: tuple[int, ...]
+
+
+class Reading(NamedTuple):
+    """One sensor's reading in wire units, `age_us` old at t_k."""
+
+    age_us: int
+    values: tuple[int, ...]
+
+
+class Sample(NamedTuple):
+    """SAMPLE(k). setpoint in 2^-32 turn; applied, momentum in LSBs of CONFIG; readings: euler, quaternion, rate."""
+
+    tick: int
+    setpoint: Triple
+    applied: Triple
+    momentum: Triple
+    ack: int
+    transit_us: int
+    source: int
+    valid: int
+    readings: tuple[Reading | None, Reading | None, Reading | None]
+
+
+class Command(NamedTuple):
+    """COMMAND(k). torque on the body in LSBs of CONFIG; `follows` counts the TELEMETRY and EVENT frames after it."""
+
+    tick: int
+    torque: Triple
+    flags: int
+    follows: int
+    used: int
+
+
+class Telemetry(NamedTuple):
+    """TELEMETRY(k): words of the table that (law_id, law_version) selects."""
+
+    tick: int
+    law_id: int
+    law_version: int
+    words: tuple[int, ...]
+
+
+class Event(NamedTuple):
+    """EVENT(k): a code of `protocol.events` and two integers."""
+
+    tick: int
+    code: int
+    a: int
+    b: int
+
+
+class Hello(NamedTuple):
+    """HELLO: opens a session. Frozen for ever; its CRC starts from 0, so that any build can read any other's."""
+
+    protocol_version: int
+    role: int
+    flags: int
+    layout_hash: int
+    nonce: int
+    clock_rate_q16: int
+    build: str
+
+
+class Ready(NamedTuple):
+    """READY: the answer to a complete CONFIG."""
+
+    status: int
+    index: int  # type: ignore[assignment]
+    table_hash: int
+
+
+class Tick(NamedTuple):
+    """TICK(k), lockstep only: step tick k without a SAMPLE."""
+
+    tick: int
+
+
+class Timing(NamedTuple):
+    """TIMING(k): host times and error counters of the board, never compared."""
+
+    tick: int
+    busy_ns: int
+    stack_bytes: int
+    rx_errors: int
+    discarded_bytes: int
+
+
+class Stop(NamedTuple):
+    """STOP: the session ends."""
+
+    reason: int
+
+
+Frame: TypeAlias = Config | Sample | Command | Telemetry | Event | Hello | Ready | Tick | Timing | Stop
+
+
+class Packet(NamedTuple):
+    """A packet taken apart. `raw` is the packet itself, header to CRC."""
+
+    version: int
+    type: int
+    sequence: int
+    tick: int
+    frame: Any  # one of Frame; Any, because the reader knows which from `type`
+    raw: bytes
+
+
+def is_housekeeping(type_: int) -> bool:
+    """Whether frames of this type are outside every comparison and have a sequence of their own."""
+    return bool(type_ & HOUSEKEEPING)
+
+
+def has_right_crc(packet: bytes) -> bool:
+    """Whether the last four bytes are the CRC of the rest; HELLO's starts from 0, every other from L.
+
+    The CRC over data and its own CRC is a constant, whatever the start: no slice is needed.
+    """
+    return zlib.crc32(packet, 0 if packet[1] == Type.HELLO else LAYOUT_HASH) == _RESIDUE
+
+
+def pack(frame: Frame, sequence: int) -> bytes:
+    """The packet of `frame`. Raises CannotPack when a number does not fit its field."""
+    try:
+        body = _PACKERS[type(frame)](frame, sequence)
+    except (struct.error, TypeError, AttributeError, ValueError) as error:
+        raise CannotPack(frame, error) from None
+    if len(body) > MAX_PACKET - 4:
+        raise CannotPack(frame, f"{len(body) + 4} bytes, at most {MAX_PACKET}")
+    start = 0 if body[1] == Type.HELLO else LAYOUT_HASH
+    return body + zlib.crc32(body, start).to_bytes(4, "little")
+
+
+def unpack(packet: bytes) -> Packet:
+    """Take a packet apart. Raises one of the BadPacket classes of `protocol.refusals`, in their order there."""
+    if len(packet) < MIN_PACKET:
+        raise TooShort(len(packet))
+    if len(packet) > MAX_PACKET:
+        raise TooLong(len(packet))
+    if not has_right_crc(packet):
+        raise BadCrc(packet)
+    version, type_, sequence, tick = _HEADER.unpack_from(packet)
+    if version != PROTOCOL_VERSION:
+        raise BadVersion(version, PROTOCOL_VERSION)
+    reader = _READERS.get(type_)
+    if reader is None:
+        raise UnknownType(type_)
+    return Packet(version, type_, sequence, tick, reader(packet, tick), packet)
+
+
+_HEADER = struct.Struct("<" + struct_format(HEADER))
+_RESIDUE = 0x2144DF1C  # CRC-32 of any data followed by its own CRC, as zlib gives it
+
+
+def _fixed(type_: Type) -> struct.Struct:
+    """Header and fixed fields of one frame type in one format."""
+    return struct.Struct("<" + struct_format(HEADER) + struct_format(LAYOUT_BY_TYPE[type_].fields))
+
+
+def _with_readings(present: int) -> struct.Struct:
+    fields = LAYOUT_BY_TYPE[Type.SAMPLE].fields
+    for reading in READINGS:
+        if present >> reading.bit & 1:
+            fields += reading.fields
+    return struct.Struct("<" + struct_format(HEADER) + struct_format(fields))
+
+
+_CONFIG, _TELEMETRY = _fixed(Type.CONFIG), _fixed(Type.TELEMETRY)
+_COMMAND, _EVENT, _HELLO, _READY = (_fixed(t) for t in (Type.COMMAND, Type.EVENT, Type.HELLO, Type.READY))
+_TICK, _TIMING, _STOP = (_fixed(t) for t in (Type.TICK, Type.TIMING, Type.STOP))
+_SAMPLES = tuple(_with_readings(present) for present in range(8))
+_WORDS = tuple(struct.Struct(f"<{n}i") for n in range(MAX_TELEMETRY_WORDS + 1))
+_PRESENT_AT = HEADER_SIZE + 3 * 12 + 4 + 4 + 1  # offset of `present` in a SAMPLE packet
+
+
+# -- pack: (frame, sequence) -> header and body ----------------------------------------------------------------------
+
+
+def _words(words: tuple[int, ...]) -> bytes:
+    if len(words) >= len(_WORDS):
+        raise ValueError(f"{len(words)} words, at most {MAX_TELEMETRY_WORDS}")
+    return _WORDS[len(words)].pack(*words)
+
+
+def _pack_config(f: Config, sequence: int) -> bytes:
+    return _CONFIG.pack(1, Type.CONFIG, sequence, NO_TICK, f.part, f.parts, f.offset, 0) + _words(f.words)
+
+
+def _pack_sample(f: Sample, sequence: int) -> bytes:
+    tick, setpoint, applied, momentum, ack, transit, source, valid, (euler, quaternion, rate) = f
+    present, tail = 0, ()  # type: tuple[int, tuple[int, ...]]
+    if euler is not None:
+        present, tail = EULER, (euler[0], *euler[1])
+    if quaternion is not None:
+        present, tail = present | QUATERNION, (*tail, quaternion[0], *quaternion[1])
+    if rate is not None:
+        present, tail = present | RATE, (*tail, rate[0], *rate[1])
+    if valid & ~present or not ZERO <= source <= HELD:
+        raise ValueError(f"source {source} is none of 0, 1, 2, or valid {valid:#x} names an absent reading")
+    head = (1, Type.SAMPLE, sequence, tick, *setpoint, *applied, *momentum)
+    return _SAMPLES[present].pack(*head, ack, transit, source, present, valid, 0, *tail)
+
+
+def _pack_command(f: Command, sequence: int) -> bytes:
+    if not USED <= f.used <= RESTARTED:
+        raise ValueError(f"used {f.used} is none of 1, 2, 3, 4")
+    return _COMMAND.pack(1, Type.COMMAND, sequence, f.tick, *f.torque, f.flags, f.follows, f.used)
+
+
+def _pack_telemetry(f: Telemetry, sequence: int) -> bytes:
+    return _TELEMETRY.pack(1, Type.TELEMETRY, sequence, f.tick, f.law_id, f.law_version) + _words(f.words)
+
+
+def _pack_event(f: Event, sequence: int) -> bytes:
+    return _EVENT.pack(1, Type.EVENT, sequence, f.tick, f.code, 0, f.a, f.b)
+
+
+def _pack_hello(f: Hello, sequence: int) -> bytes:
+    build = f.build.encode("ascii")
+    if len(build) > 24 or not f.build.isprintable():
+        raise ValueError(f"build {f.build!r} is not at most 24 printable ASCII characters")
+    return _HELLO.pack(1, Type.HELLO, sequence, NO_TICK, *f[:6], build)
+
+
+def _pack_ready(f: Ready, sequence: int) -> bytes:
+    return _READY.pack(1, Type.READY, sequence, NO_TICK, *f)
+
+
+def _pack_tick(f: Tick, sequence: int) -> bytes:
+    return _TICK.pack(1, Type.TICK, sequence, f.tick)
+
+
+def _pack_timing(f: Timing, sequence: int) -> bytes:
+    return _TIMING.pack(1, Type.TIMING, sequence, *f)
+
+
+def _pack_stop(f: Stop, sequence: int) -> bytes:
+    return _STOP.pack(1, Type.STOP, sequence, NO_TICK, f.reason, 0)
+
+
+_PACKERS: dict[type, Callable[[Any, int], bytes]] = {
+    Config: _pack_config,
+    Sample: _pack_sample,
+    Command: _pack_command,
+    Telemetry: _pack_telemetry,
+    Event: _pack_event,
+    Hello: _pack_hello,
+    Ready: _pack_ready,
+    Tick: _pack_tick,
+    Timing: _pack_timing,
+    Stop: _pack_stop,
+}
+
+
+# -- unpack: (packet, tick) -> frame ---------------------------------------------------------------------------------
+
+
+def _exactly(form: struct.Struct, packet: bytes) -> tuple[Any, ...]:
+    """Body fields (after the header's four) of a packet whose length is fixed."""
+    if len(packet) != form.size + 4:
+        raise BadLength(packet[1], len(packet), form.size + 4)
+    return form.unpack_from(packet)[4:]
+
+
+def _with_words(form: struct.Struct, packet: bytes) -> tuple[tuple[Any, ...], tuple[int, ...]]:
+    count, odd = divmod(len(packet) - form.size - 4, 4)
+    if count < 0 or odd:
+        raise BadLength(packet[1], len(packet), f"{form.size + 4} + 4 n")
+    return form.unpack_from(packet)[4:], _WORDS[count].unpack_from(packet, form.size)
+
+
+def _tickless(type_: Type, tick: int) -> None:
+    if tick != NO_TICK:
+        raise BadValue(type_, "tick", tick, "NO_TICK")
+
+
+def _ticked(type_: Type, tick: int) -> None:
+    if tick == NO_TICK:
+        raise BadValue(type_, "tick", tick, "a tick")
+
+
+def _read_config(packet: bytes, tick: int) -> Config:
+    (part, parts, offset, reserved), words = _with_words(_CONFIG, packet)
+    _tickless(Type.CONFIG, tick)
+    if part >= parts:
+        raise BadValue(Type.CONFIG, "part", part, f"less than parts = {parts}")
+    if reserved:
+        raise BadValue(Type.CONFIG, "reserved", reserved, "0")
+    return Config(part, parts, offset, words)
+
+
+def _read_sample(packet: bytes, tick: int) -> Sample:
+    if len(packet) <= _PRESENT_AT + 6:
+        raise BadLength(Type.SAMPLE, len(packet), _SAMPLES[0].size + 4)
+    present = packet[_PRESENT_AT]
+    if present > 7:
+        raise BadValue(Type.SAMPLE, "present", present, "bits 0 to 2")
+    form = _SAMPLES[present]
+    if len(packet) != form.size + 4:
+        raise BadLength(Type.SAMPLE, len(packet), form.size + 4)
+    v = form.unpack_from(packet)
+    source, valid = v[15], v[17]
+    if source > HELD or valid & ~present or v[18] or tick == NO_TICK:
+        raise _bad_sample(tick, source, present, valid, v[18])
+    at = 19
+    readings: list[Reading | None] = [None, None, None]
+    for bit, size in _SHAPES[present]:
+        readings[bit] = Reading(v[at], v[at + 1 : at + size])
+        at += size
+    return Sample(tick, v[4:7], v[7:10], v[10:13], v[13], v[14], source, valid, tuple(readings))  # type: ignore[arg-type]
+
+
+_SHAPES = tuple(
+    tuple((r.bit, 1 + r.fields[1].length) for r in READINGS if present >> r.bit & 1) for present in range(8)
+)
+
+
+def _bad_sample(tick: int, source: int, present: int, valid: int, reserved: int) -> BadPacket:
+    if tick == NO_TICK:
+        return BadValue(Type.SAMPLE, "tick", tick, "a tick")
+    if source > HELD:
+        return BadValue(Type.SAMPLE, "source", source, "0, 1 or 2")
+    if valid & ~present:
+        return BadValue(Type.SAMPLE, "valid", valid, f"a part of present = {present:#x}")
+    return BadValue(Type.SAMPLE, "reserved", reserved, "0")
+
+
+def _read_command(packet: bytes, tick: int) -> Command:
+    x, y, z, flags, follows, used = _exactly(_COMMAND, packet)
+    _ticked(Type.COMMAND, tick)
+    if not USED <= used <= RESTARTED:
+        raise BadValue(Type.COMMAND, "used", used, "1, 2, 3 or 4")
+    return Command(tick, (x, y, z), flags, follows, used)
+
+
+def _read_telemetry(packet: bytes, tick: int) -> Telemetry:
+    (law_id, law_version), words = _with_words(_TELEMETRY, packet)
+    _ticked(Type.TELEMETRY, tick)
+    return Telemetry(tick, law_id, law_version, words)
+
+
+def _read_event(packet: bytes, tick: int) -> Event:
+    code, reserved, a, b = _exactly(_EVENT, packet)
+    _ticked(Type.EVENT, tick)
+    if reserved:
+        raise BadValue(Type.EVENT, "reserved", reserved, "0")
+    return Event(tick, code, a, b)
+
+
+def _read_hello(packet: bytes, tick: int) -> Hello:
+    version, role, flags, layout_hash, nonce, rate, raw = _exactly(_HELLO, packet)
+    _tickless(Type.HELLO, tick)
+    text = raw.rstrip(b"\0")
+    if role > ROLE_BOARD:
+        raise BadValue(Type.HELLO, "role", role, "0 or 1")
+    if not all(0x20 <= byte <= 0x7E for byte in text):
+        raise BadValue(Type.HELLO, "build", raw, "printable ASCII, padded with NUL")
+    return Hello(version, role, flags, layout_hash, nonce, rate, text.decode("ascii"))
+
+
+def _read_ready(packet: bytes, tick: int) -> Ready:
+    ready = Ready(*_exactly(_READY, packet))
+    _tickless(Type.READY, tick)
+    return ready
+
+
+def _read_tick(packet: bytes, tick: int) -> Tick:
+    _exactly(_TICK, packet)
+    _ticked(Type.TICK, tick)
+    return Tick(tick)
+
+
+def _read_timing(packet: bytes, tick: int) -> Timing:
+    return Timing(tick, *_exactly(_TIMING, packet))
+
+
+def _read_stop(packet: bytes, tick: int) -> Stop:
+    reason, reserved = _exactly(_STOP, packet)
+    _tickless(Type.STOP, tick)
+    if reserved:
+        raise BadValue(Type.STOP, "reserved", reserved, "0")
+    return Stop(reason)
+
+
+_READERS: dict[int, Callable[[bytes, int], Frame]] = {
+    Type.CONFIG: _read_config,
+    Type.SAMPLE: _read_sample,
+    Type.COMMAND: _read_command,
+    Type.TELEMETRY: _read_telemetry,
+    Type.EVENT: _read_event,
+    Type.HELLO: _read_hello,
+    Type.READY: _read_ready,
+    Type.TICK: _read_tick,
+    Type.TIMING: _read_timing,
+    Type.STOP: _read_stop,
+}
