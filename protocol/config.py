@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from protocol.frames import MAX_CONFIG_WORDS, Config
 
-MAX_PARTS = 64
+MAX_PARTS = 320  # 4096 guidance rows and the words before them
 MAX_WORDS = MAX_PARTS * MAX_CONFIG_WORDS
 
 
