@@ -1,0 +1,257 @@
+"""`sil check`: what a scenario will run into, said before it runs. Errors stop it, warnings are for a person to weigh.
+
+Arithmetic only, nothing is run: wire and execution time against T_s, what the law admits, what the wheels can give.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+from protocol import codec, frames
+from protocol.channel import wire_time_ns
+from protocol.config import MAX_WORDS
+from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
+from sil import scenario_law as laws
+from sil.configure import Orders, orders
+from sil.scenario import Scenario, load_scenario
+from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
+from sil.schedule import read_schedule
+from sil.sensors import SENSORS
+
+Severity = Literal["error", "warning"]
+ANGLES = ("roll", "pitch", "yaw")
+
+
+class Finding(NamedTuple):
+    """One line of `sil check`."""
+
+    severity: Severity
+    where: str
+    key: str
+    line: int  # 0: not from a file
+    expected: str
+    got: str
+
+    def __str__(self) -> str:
+        text = str(Problem(self.where, self.key, self.expected, self.got, self.line))
+        return f"warning: {text}" if self.severity == "warning" else text
+
+
+def check_scenario(
+    name_or_path: str, sets: Iterable[str] = (), user_table: laws.UserTable = laws.table_of_user_law
+) -> list[Finding]:
+    """Load and check; a scenario that cannot be loaded is a list of errors, too."""
+    try:
+        return check(load_scenario(name_or_path, sets, user_table))
+    except ScenarioInvalid as error:
+        return [_finding("error", problem) for problem in error.problems]
+
+
+def check(scenario: Scenario) -> list[Finding]:
+    """Everything worth saying about a scenario that loads, errors first."""
+    checks: list[Callable[[Scenario], Iterator[Finding]]] = [_wheels, _noise, _disturbance]
+    if scenario.board == "none":
+        checks.insert(0, _schedule)
+    else:
+        checks = [_law, _sensors, _clock, _deadline, *checks, _manoeuvre]
+    found = [finding for each in checks for finding in each(scenario)]
+    return sorted(found, key=lambda finding: finding.severity != "error")
+
+
+# -- errors -----------------------------------------------------------------------------------------------------------
+
+
+def _law(scenario: Scenario) -> Iterator[Finding]:
+    """Can CONFIG be written, and does the law fly with it?"""
+    table = scenario.law_table
+    try:
+        made = orders(scenario)
+    except ConfigError as error:
+        yield _error(scenario, "law.params", "values that fit the words of CONFIG", str(error))
+        return
+    if len(made.words) > MAX_WORDS:
+        got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
+        yield _error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
+    found = [*_law_period(scenario), *_law_delay(scenario, made)]
+    yield from found
+    reason = refusal(made.configuration)
+    if reason is not None and not found:
+        yield _error(scenario, "law.name", f"a configuration that law {table.name} admits", reason)
+
+
+def _law_period(scenario: Scenario) -> Iterator[Finding]:
+    low, high = scenario.law_table.period_s
+    if not low <= scenario.period_s <= high:
+        expected = f"a number in s from {low:g} to {high:g} for law {scenario.law.name}"
+        yield _error(scenario, "period_s", expected, shown(scenario.period_s))
+
+
+def _law_delay(scenario: Scenario, made: Orders) -> Iterator[Finding]:
+    delays = scenario.law_table.variant(made.configuration.values).transport_delays
+    if scenario.transport_delay_ticks not in delays:
+        expected = f"{' or '.join(map(str, delays))} for law {scenario.law.name}"
+        yield _error(scenario, "transport_delay_ticks", expected, shown(scenario.transport_delay_ticks))
+
+
+def _sensors(scenario: Scenario) -> Iterator[Finding]:
+    for bit, name in enumerate(SENSORS):
+        if scenario.law_table.needs >> bit & 1 and not getattr(scenario.sensors, name).enabled:
+            yield _error(scenario, f"sensors.{name}.enabled", f"true, law {scenario.law.name} reads it", "false")
+
+
+def _clock(scenario: Scenario) -> Iterator[Finding]:
+    if scenario.transport_delay_ticks == 0 and scenario.clock != "lockstep":
+        got = f"{scenario.clock} with transport_delay_ticks 0"
+        yield _error(scenario, "clock", "lockstep, where the plant waits for the answer", got)
+    if scenario.sample_timeout_us >= scenario.period_us:
+        expected = f"a number in s below the period ({scenario.period_s:g})"
+        yield _error(scenario, "sample_timeout_s", expected, shown(scenario.sample_timeout_us * 1e-6))
+
+
+def _deadline(scenario: Scenario) -> Iterator[Finding]:
+    """Wire up + execution + wire down against n T_s, and what each link and the board can carry per period."""
+    if scenario.expect_missed:
+        return
+    up_s, command_s, answer_s = wire_times_s(scenario)
+    busy_s, period_s, n = scenario.answer_delay_s, scenario.period_s, scenario.transport_delay_ticks
+    key = "answer_delay_s" if busy_s > up_s + answer_s else "link.baud"
+    whole_s = up_s + busy_s + command_s
+    if n and whole_s >= n * period_s:
+        parts = f"{_ms(up_s)} up + {_ms(busy_s)} execution + {_ms(command_s)} down = {_ms(whole_s)}"
+        yield _error(scenario, key, f"COMMAND within {n} x {period_s:g} s, or expect_missed: true", parts)
+    elif busy_s >= period_s:
+        expected = f"a number in s below the period ({period_s:g}), or expect_missed: true"
+        yield _error(scenario, "answer_delay_s", expected, shown(busy_s))
+    elif max(up_s, answer_s) >= period_s:
+        got = f"{_ms(up_s)} up, {_ms(answer_s)} down"
+        yield _error(scenario, "link.baud", f"frames of one tick within {period_s:g} s each way", got)
+
+
+def wire_times_s(scenario: Scenario) -> tuple[float, float, float]:
+    """Modelled time on the wire of SAMPLE, COMMAND, and COMMAND with TELEMETRY, in s; without events."""
+    values = ((0,) * 3, (0,) * 4, (0,) * 3)
+    on = [getattr(scenario.sensors, name).enabled for name in SENSORS]
+    readings = tuple(frames.Reading(0, v) if flag else None for v, flag in zip(values, on, strict=True))
+    zero = (0, 0, 0)
+    sample = _wire_s(scenario, frames.Sample(0, zero, zero, zero, 0, 0, 0, 0, readings))  # type: ignore[arg-type]
+    command = _wire_s(scenario, frames.Command(0, zero, 0, 0, frames.USED))
+    words = (0,) * (len(TELEMETRY_COMMON) + len(scenario.law_table.telemetry))
+    telemetry = _wire_s(scenario, frames.Telemetry(0, 0, 0, words)) if scenario.telemetry_every else 0.0
+    return sample, command, command + telemetry
+
+
+def _wire_s(scenario: Scenario, frame: frames.Frame) -> float:
+    return wire_time_ns(len(codec.encode(frames.pack(frame, 0))), scenario.link.baud) * 1e-9
+
+
+def _schedule(scenario: Scenario) -> Iterator[Finding]:
+    file = scenario.file_of("schedule")
+    try:
+        if file is not None:
+            read_schedule(file, scenario.period_s, scenario.ticks)
+    except ScenarioInvalid as error:
+        yield from (_finding("error", problem) for problem in error.problems)
+
+
+# -- warnings ---------------------------------------------------------------------------------------------------------
+
+
+def _wheels(scenario: Scenario) -> Iterator[Finding]:
+    wheels = scenario.actuators.wheels
+    for axis in range(3):
+        speed, inertia, most = (
+            wheels.initial_speed_radps[axis],
+            wheels.inertia_kgm2[axis],
+            wheels.momentum_max_Nms[axis],
+        )
+        if speed and not inertia:
+            expected = "0 without actuators.wheels.inertia_kgm2: it carries no momentum"
+            yield _warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed:g} rad/s")
+        elif most is not None and abs(speed * inertia) > most:
+            expected = f"a start within momentum_max_Nms ({most:g})"
+            yield _warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed * inertia:g} N m s")
+
+
+def _noise(scenario: Scenario) -> Iterator[Finding]:
+    """Noise far below the LSB hardly ever changes a reading."""
+    sensors = scenario.sensors
+    steps = (
+        ("attitude.noise_deg", sensors.attitude.noise_deg, 360.0 / 2 ** (sensors.attitude.bits or 32)),
+        (
+            "quaternion.noise_deg",
+            sensors.quaternion.noise_deg,
+            math.degrees(4.0 / 2 ** (sensors.quaternion.bits or 31)),
+        ),
+        ("rate.noise_degps", sensors.rate.noise_degps, sensors.rate.lsb_degps),
+    )
+    for key, noise, lsb in steps:
+        if 0 < noise < 0.1 * lsb:
+            yield _warning(scenario, f"sensors.{key}", f"0, or at least a tenth of the LSB ({lsb:.3g})", f"{noise:g}")
+
+
+def _disturbance(scenario: Scenario) -> Iterator[Finding]:
+    """A constant torque fills the wheels; no law can help that."""
+    for axis in range(3):
+        torque, most = scenario.plant.disturbance_Nm.constant_Nm[axis], scenario.actuators.wheels.momentum_max_Nms[axis]
+        if most is not None and abs(torque) * scenario.duration_s > most:
+            expected = f"less than momentum_max_Nms ({most:g}) over {scenario.duration_s:g} s"
+            got = f"{abs(torque) * scenario.duration_s:g} N m s about axis {'xyz'[axis]}"
+            yield _warning(scenario, "plant.disturbance_Nm.constant_Nm", expected, got)
+
+
+def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
+    """Largest step through a critically damped reference: peak rate wn * step / e, peak acceleration wn^2 * step."""
+    wn, wheels = scenario.guidance.wn_radps, scenario.actuators.wheels
+    if scenario.guidance.reference == "none":
+        return
+    if wn * scenario.period_s > 0.5:
+        expected = f"at most {0.5 / scenario.period_s:g} rad/s, half a radian per sample"
+        yield _warning(scenario, "guidance.wn_radps", expected, shown(wn))
+    for axis, step_deg in enumerate(_largest_steps_deg(scenario)):
+        step, inertia = math.radians(step_deg), scenario.plant.inertia_kgm2[axis][axis]
+        torque, most_torque = inertia * wn * wn * step, wheels.torque_max_Nm[axis]
+        momentum, most_momentum = inertia * wn * step / math.e, wheels.momentum_max_Nms[axis]
+        if most_torque is not None and torque > most_torque:
+            expected = f"at least {torque:.3g} N m for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
+            yield _warning(scenario, "actuators.wheels.torque_max_Nm", expected, shown(most_torque))
+        if most_momentum is not None and momentum > most_momentum:
+            expected = f"at least {momentum:.3g} N m s for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
+            yield _warning(scenario, "actuators.wheels.momentum_max_Nms", expected, shown(most_momentum))
+
+
+def _largest_steps_deg(scenario: Scenario) -> list[float]:
+    """Largest step of the set-point on each axis; the reference starts at the initial attitude where that is known."""
+    start = scenario.plant.initial
+    known = start.q is None and start.frame == scenario.attitude.frame
+    points = [start.attitude_deg if known else (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    points += [row.xyz_deg for row in scenario.setpoints()]
+    if len(points) > 2 and scenario.setpoints()[0].tick == 0:
+        del points[1]
+    pairs = list(pairwise(points))
+    return [max((abs(after[axis] - before[axis]) for before, after in pairs), default=0.0) for axis in range(3)]
+
+
+# -- findings ---------------------------------------------------------------------------------------------------------
+
+
+def _ms(time_s: float) -> str:
+    return f"{time_s * 1e3:.3g} ms"
+
+
+def _error(scenario: Scenario, key: str, expected: str, got: str) -> Finding:
+    return _finding("error", _at(scenario.where(key), key, expected, got))
+
+
+def _warning(scenario: Scenario, key: str, expected: str, got: str) -> Finding:
+    return _finding("warning", _at(scenario.where(key), key, expected, got))
+
+
+def _at(place: Where, key: str, expected: str, got: str) -> Problem:
+    return Problem(str(place), key, expected, got, place.line)
+
+
+def _finding(severity: Severity, problem: Problem) -> Finding:
+    return Finding(severity, problem.where, problem.key, problem.line, problem.expected, problem.got)
