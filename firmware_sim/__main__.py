@@ -55,9 +55,13 @@ def _parser() -> argparse.ArgumentParser:
         description="The controller of the testbed in its own process: fixed-point law, own timer, nothing of the plant.",
         epilog="examples: --link serial:///dev/pts/7   --link udp://127.0.0.1:5005   --link udp://0.0.0.0:5005",
     )
-    parser.add_argument("--link", required=True, metavar="URL", help="serial://PATH[?baud=N] or udp://HOST:PORT to listen on")
+    parser.add_argument(
+        "--link", required=True, metavar="URL", help="serial://PATH[?baud=N] or udp://HOST:PORT to listen on"
+    )
     parser.add_argument("--law", metavar="FILE.py:CLASS", help="a law of your own, as the scenario names it")
-    parser.add_argument("--once", action="store_true", help="exit after the first session (default: serve until stopped)")
+    parser.add_argument(
+        "--once", action="store_true", help="exit after the first session (default: serve until stopped)"
+    )
     parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
     return parser
 

@@ -84,9 +84,7 @@ class Board:
         flags = frames.HELLO_OWN_TIMER
         flags |= frames.HELLO_CONFIGURED if self._flight else 0
         flags |= frames.HELLO_ECHO if echo else 0
-        return Hello(
-            frames.PROTOCOL_VERSION, frames.ROLE_BOARD, flags, frames.LAYOUT_HASH, self._nonce or 0, 0, BUILD
-        )
+        return Hello(frames.PROTOCOL_VERSION, frames.ROLE_BOARD, flags, frames.LAYOUT_HASH, self._nonce or 0, 0, BUILD)
 
     def _on_hello(self, packet: Packet) -> None:
         hello: Hello = packet.frame
@@ -178,4 +176,3 @@ class Board:
         answer = flight.step(self._next_tick, sample)
         self._next_tick += 1
         self._port.send(*answer)
-

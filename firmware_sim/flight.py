@@ -119,6 +119,8 @@ class Flight:
         if overrun:
             flags |= frames.FLAG_OVERRUN
             notices.append(Event(tick, events.OVERRUN, tick, self._overruns))
+        elif sample is not None and not usable:
+            notices.append(Event(tick, events.READING_INVALID, self._needs, sample.valid))
         if not usable:
             notices.append(Event(tick, events.SAMPLE_LOST, tick, self._lost))
         self._sent = [*self._sent[1:], torque]

@@ -143,7 +143,9 @@ class Answers:
     def _follower(self, packet: Packet) -> None:
         self._followers = max(0, self._followers - 1)
         delivered = self._fate(packet).delivered
-        self._recorder.packet(packet.tick, Direction.DOWN, Outcome.DELIVERED if delivered else Outcome.DROPPED, packet.raw)
+        self._recorder.packet(
+            packet.tick, Direction.DOWN, Outcome.DELIVERED if delivered else Outcome.DROPPED, packet.raw
+        )
 
     def _fate(self, packet: Packet) -> Fate:
         sent_ns = self._done_ns.get(packet.tick, 0)

@@ -64,6 +64,7 @@ class Loop:
         self.period_s = timing.period_ns * 1e-9
         self.bound_rad = None if bound_deg is None else math.radians(bound_deg)
         self.degraded_ticks = 0
+        self.ticks_done = timing.first_tick
         self.lateness_ns: list[int] = []
 
     def tick(self, k: int) -> Motion:
@@ -151,6 +152,7 @@ class Loop:
         self.commands.notices.clear()
         self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
         self.recorder.commit(k)
+        self.ticks_done = k + 1
 
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:

@@ -35,6 +35,7 @@ from sil.unplugged import Nobody, Scheduled
 
 Notify = Callable[[str], None]
 HELLO_WITHIN_S = 10.0
+WIRED_WITHIN_S = 60.0  # a person types the other command
 DEAD_AFTER_S = 10.0
 
 
@@ -65,18 +66,16 @@ class Rig:
                 self.host.close()
 
 
-def assemble(
-    scenario: Scenario, recorder: Recorder, log: Path | None, notify: Notify, hello_within_s: float = HELLO_WITHIN_S
-) -> Rig:
+def assemble(scenario: Scenario, recorder: Recorder, log: Path | None, notify: Notify, wired: bool = False) -> Rig:
     """Build everything; with a board, the session is open and the board READY. Raises SilError with one line.
 
-    log: file for a board process's stderr. hello_within_s: how long to wait for a board that somebody else starts.
+    log: file for a board process's stderr. wired: somebody else starts the board, whatever the scenario says.
     """
     try:
         clock = new_clock(scenario.clock)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
-        return _with_board(scenario, clock, recorder, log, notify, hello_within_s)
+        return _with_board(scenario, clock, recorder, log, notify, wired)
     except LinkError as error:
         raise LinkFailure(str(error)) from None
 
@@ -94,11 +93,12 @@ def law_orders(scenario: Scenario) -> Orders:
 
 
 def _with_board(
-    scenario: Scenario, clock: Clock, recorder: Recorder, log: Path | None, notify: Notify, hello_within_s: float
+    scenario: Scenario, clock: Clock, recorder: Recorder, log: Path | None, notify: Notify, wired: bool
 ) -> Rig:
     made = law_orders(scenario)
     window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
     kind, url = board_and_link(scenario)
+    kind = "wired" if wired else kind
     host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify))
     rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made)  # type: ignore[arg-type]
     try:
@@ -106,10 +106,16 @@ def _with_board(
         rig.port = Port(host.link)
         rig.session = Session(rig.port, clock_rate_q16(clock), host.check_alive)
         loop = _loop(scenario, clock, Nobody(), window, recorder, made)
-        packets = rig.session.open(made.words, made.configuration.hash, hello_within_s, notify)
+        packets = rig.session.open(
+            made.words, made.configuration.hash, WIRED_WITHIN_S if wired else HELLO_WITHIN_S, notify
+        )
         rig.config_packets = tuple(packets)
         rig.answers = loop.board = _answers(scenario, rig, recorder)
         rig.loop = loop
+    except LinkError as error:
+        reason = host.post_mortem(error)
+        rig.stop(frames.STOP_FAILED)
+        raise LinkFailure(reason) from None
     except BaseException:
         rig.stop(frames.STOP_FAILED)
         raise
@@ -170,7 +176,7 @@ def _loop(
     delay = scenario.transport_delay_ticks if made is not None else 0
     return Loop(
         Timing(scenario.period_ns, delay, scenario.ticks),
-        Scales(2.0 ** -scenario.torque_bits, 2.0**-scenario.wire.momentum_bits),
+        Scales(2.0**-scenario.torque_bits, 2.0**-scenario.wire.momentum_bits),
         load(PLANTS, "plant.kind", scenario.plant.kind).from_scenario(scenario),
         load(ACTUATORS, "actuators", "wheels").from_scenario(scenario),
         _sensors(scenario),
@@ -187,4 +193,3 @@ def _sensors(scenario: Scenario) -> list[Sensor]:
     """The instruments that the scenario switches on."""
     on = [name for name in SENSORS if getattr(scenario.sensors, name).enabled]
     return [load(SENSORS, "sensors", name).from_scenario(scenario) for name in on]
-

@@ -18,10 +18,9 @@ import numpy as np
 from protocol import frames
 from protocol.links import LinkError
 from sil.metrics import Judgement, judge, measure
-from sil.rig import Rig, assemble, record_config
+from sil.rig import Rig, assemble, record_config, user_law_spec
 from sil.runs import open_run
 from sil.scenario import Scenario
-from sil.scenario_law import is_user_law
 from sil.signals import Motion
 from sil.sinks.journal import Journal, JournalError
 from sil.sinks.recorder import JournalRecorder
@@ -53,12 +52,15 @@ class Watch:
         """`start`, `run`, `seal`."""
 
 
-def run_scenario(scenario: Scenario, out: Path | None = None, watch: Watch | None = None) -> dict[str, Any]:
+def run_scenario(
+    scenario: Scenario, out: Path | None = None, watch: Watch | None = None, wired: bool = False
+) -> dict[str, Any]:
     """Run a scenario and leave a complete run directory; returns the summary, which is also in summary.json.
 
     out: run directory, refused if it is not empty; None makes runs/NAME-NNN. SIGINT and SIGTERM end the run at the
     next tick, with log and summary complete. Raises UsageError before anything was run; a link or board that fails
-    later is in the summary (`verdict: link_failure`, exit code 3), since what was recorded until then is kept.
+    later is in the summary (`failure`, exit code 3), since what was recorded until then is kept. wired: somebody else
+    starts the board; wait for it.
     """
     watch = watch or Watch()
     folder = new_run_dir(scenario.name, out)
@@ -69,7 +71,7 @@ def run_scenario(scenario: Scenario, out: Path | None = None, watch: Watch | Non
     recorder = JournalRecorder(journal)
     with stop_requests() as stop:
         try:
-            outcome = _fly(scenario, folder, recorder, stop, watch)
+            outcome = _fly(scenario, folder, recorder, stop, watch, wired)
         except BaseException:
             journal.close()
             raise
@@ -92,13 +94,20 @@ class Outcome:
         self.rig: Rig | None = None
 
 
-def _fly(scenario: Scenario, folder: Path, recorder: JournalRecorder, stop: Callable[[], bool], watch: Watch) -> Outcome:
+def _fly(
+    scenario: Scenario,
+    folder: Path,
+    recorder: JournalRecorder,
+    stop: Callable[[], bool],
+    watch: Watch,
+    wired: bool,
+) -> Outcome:
     """Assemble, loop, take down; the journal is closed with END whatever happened once it had begun."""
     outcome = Outcome()
     started = time.perf_counter()
     watch.stage("start")
     try:
-        rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note)
+        rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note, wired)
     except SilError:
         _discard(folder, recorder)
         raise
@@ -110,15 +119,18 @@ def _fly(scenario: Scenario, folder: Path, recorder: JournalRecorder, stop: Call
     began = time.perf_counter()
     try:
         outcome.ticks, outcome.reason = rig.loop.run(stop, lambda k, motion: watch.tick(k, scenario.ticks, motion))
-    except (LinkError, LinkFailure) as error:
-        outcome.failure, outcome.ticks = str(error), rig.loop.ticks_done
-    except JournalError as error:
-        outcome.failure, outcome.ticks = str(error), rig.loop.ticks_done
+    except (LinkError, LinkFailure, JournalError) as error:
+        outcome.failure, outcome.ticks = _why(rig, error), rig.loop.ticks_done
     finally:
         outcome.wall_s = time.perf_counter() - began
         rig.stop({"finished": frames.STOP_DONE, "interrupted": frames.STOP_INTERRUPTED}.get(outcome.reason, 2))
         _close(recorder, outcome)
     return outcome
+
+
+def _why(rig: Rig, error: Exception) -> str:
+    """One line; a link that closed is explained by the board that died, if one did."""
+    return rig.host.post_mortem(error) if isinstance(error, LinkError) and rig.host is not None else str(error)
 
 
 def _close(recorder: JournalRecorder, outcome: Outcome) -> None:
@@ -161,10 +173,15 @@ def identity(scenario: Scenario, rig: Rig) -> dict[str, Any]:
     return meta
 
 
+def _law_file(scenario: Scenario) -> str:
+    """Where a user's own law came from, for replay; "" for a law of the product."""
+    return user_law_spec(scenario).rpartition(":")[0]
+
+
 def _law_file_sha256(scenario: Scenario) -> str:
     """Of the file of a user's own law; "" for a law of the product."""
-    file = scenario.file_of("law.name") if is_user_law(scenario.law.name) else None
-    return hashlib.sha256(file.read_bytes()).hexdigest() if file is not None else ""
+    file = _law_file(scenario)
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
 
 
 def host_facts(scenario: Scenario, rig: Rig) -> dict[str, Any]:
@@ -200,7 +217,9 @@ def new_run_dir(name: str, out: Path | None) -> Path:
 
 def _next_run_dir(parent: Path, name: str) -> Path:
     parent.mkdir(exist_ok=True)
-    numbers = [int(p.name.removeprefix(f"{name}-")) for p in parent.glob(f"{name}-*") if p.name[len(name) + 1 :].isdigit()]
+    numbers = [
+        int(p.name.removeprefix(f"{name}-")) for p in parent.glob(f"{name}-*") if p.name[len(name) + 1 :].isdigit()
+    ]
     number = max(numbers, default=0)
     while True:
         number += 1
@@ -217,8 +236,9 @@ def _next_run_dir(parent: Path, name: str) -> Path:
 def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealReport) -> dict[str, Any]:
     run = open_run(folder)
     metrics = measure(run)
-    link = _link_counters(outcome.rig)
-    judgements = judge(scenario.require, {**metrics, **link}) if outcome.reason in ("finished", "diverged") else []
+    link = _link_counters(outcome.rig, metrics)
+    metrics |= {"crc_errors": link["crc_errors"], "discarded_bytes": link["discarded_bytes"]}
+    judgements = judge(scenario.require, metrics) if outcome.reason in ("finished", "diverged") else []
     degraded = outcome.rig.loop.degraded_ticks if outcome.rig else 0
     exit_code, verdict = _verdict(outcome, judgements, degraded, metrics)
     window = outcome.rig.window if outcome.rig else None
@@ -236,6 +256,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "timing": _timing(scenario, outcome, report),
         "reproducible": not (window.real_misses if window else 0),
         "sha256": report.sha256,
+        "law_file": _law_file(scenario),
         "run_dir": str(folder),
     }
 
@@ -256,17 +277,16 @@ def _verdict(
     return EXIT_OK, "passed"
 
 
-def _link_counters(rig: Rig | None) -> dict[str, int]:
-    if rig is None or rig.port is None or rig.window is None or rig.answers is None:
-        return {"missed": 0, "late": 0, "real_misses": 0, "overruns": 0, "crc_errors": 0, "discarded_bytes": 0}
-    counters = rig.port.counters
+def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int]:
+    """From the log what is in the log; real misses, CRC errors and discarded bytes belong to this host's link."""
+    counters = rig.port.counters if rig is not None and rig.port is not None else None
     return {
-        "missed": rig.window.missed,
-        "late": rig.window.late,
-        "real_misses": rig.window.real_misses,
-        "overruns": rig.answers.overruns,
-        "crc_errors": counters.crc_errors,
-        "discarded_bytes": counters.discarded_bytes,
+        "missed": metrics["missed"],
+        "late": metrics["late"],
+        "real_misses": rig.window.real_misses if rig is not None and rig.window is not None else 0,
+        "overruns": metrics["overruns"],
+        "crc_errors": counters.crc_errors if counters is not None else 0,
+        "discarded_bytes": counters.discarded_bytes if counters is not None else 0,
     }
 
 
@@ -329,4 +349,3 @@ def stop_requests() -> Iterator[Callable[[], bool]]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-

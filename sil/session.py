@@ -34,7 +34,9 @@ class Session:
         )
         self.board: Hello | None = None  # who answered
 
-    def open(self, words: Sequence[int], table_hash: int, within_s: float, notify: Callable[[str], None]) -> list[bytes]:
+    def open(
+        self, words: Sequence[int], table_hash: int, within_s: float, notify: Callable[[str], None]
+    ) -> list[bytes]:
         """Say hello, configure, wait for READY. Returns the CONFIG packets (they are deterministic frames).
 
         Raises LinkFailure: nobody answers, another protocol or layout, a refused word, another table.
@@ -113,4 +115,3 @@ class Session:
             if packet is not None and (found := wanted(packet)) is not None:
                 return found
         return None
-

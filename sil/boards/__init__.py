@@ -35,6 +35,9 @@ class BoardHost(Protocol):
     def check_alive(self) -> None:
         """Raises LinkFailure when the board is known to be gone; silence is the caller's to judge."""
 
+    def post_mortem(self, error: Exception) -> str:
+        """Why the link failed, in one line: the board's own last words where it left any, else the link's."""
+
     def close(self) -> None:
         """Unplug, and leave no process behind. Safe to call twice."""
 

@@ -23,6 +23,9 @@ class InprocBoard:
     def check_alive(self) -> None:
         """It lives as long as this process does."""
 
+    def post_mortem(self, error: Exception) -> str:
+        return str(error)
+
     def close(self) -> None:
         self.link.close()
         self._port.close()

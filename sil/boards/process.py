@@ -25,7 +25,9 @@ class ProcessBoard:
     def __init__(self, order: BoardOrder) -> None:
         scheme = order.link_url.partition(":")[0]
         if scheme not in ("pty", "udp"):
-            raise UsageError(f"link: a board process is reached over pty or udp, got {order.link_url!r}; known: pty, udp")
+            raise UsageError(
+                f"link: a board process is reached over pty or udp, got {order.link_url!r}; known: pty, udp"
+            )
         self._log: IO[bytes] = open(order.log, "w+b") if order.log else tempfile.TemporaryFile()  # noqa: SIM115
         self._child: subprocess.Popen[bytes] | None = None
         self.link: Link = None  # type: ignore[assignment]  # until the child listens
@@ -40,6 +42,18 @@ class ProcessBoard:
         code = self._child.poll()
         if code is not None:
             raise LinkFailure(f"board: the controller process ended with {_describe(code)}{self._last_words()}")
+
+    def post_mortem(self, error: Exception) -> str:
+        """A process that is about to end is given a moment to say why."""
+        assert self._child is not None
+        try:
+            self._child.wait(STOP_S)
+            self.check_alive()
+        except subprocess.TimeoutExpired:
+            return str(error)
+        except LinkFailure as failure:
+            return str(failure)
+        return str(error)
 
     def close(self) -> None:
         """Unplug; a board that was told STOP, or whose pty is gone, ends by itself, and it has no state to lose."""
@@ -72,11 +86,6 @@ class ProcessBoard:
         return open_link(self._listening(), listen=False)
 
     def _launch(self, order: BoardOrder, url: str) -> None:
-        # -P and PYTHONPATH: the child runs the package this process runs, not what lies in the working directory.
-        spec = importlib.util.find_spec("firmware_sim")
-        assert spec is not None and spec.origin is not None
-        home = str(Path(spec.origin).parent.parent)
-        paths = [home, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
         command = [sys.executable, "-P", "-m", "firmware_sim", "--link", url, "--once", "--parent", str(os.getpid())]
         if order.law_file:
             command += ["--law", order.law_file]
@@ -85,7 +94,7 @@ class ProcessBoard:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=self._log,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+            env=child_environment(),
             start_new_session=True,  # Ctrl-C in the terminal is the laboratory's to handle
         )
 
@@ -110,6 +119,15 @@ class ProcessBoard:
         self._log.seek(0)
         lines = [line for line in self._log.read().decode(errors="replace").splitlines() if line.strip()]
         return f": {lines[-1].strip()}" if lines else ""
+
+
+def child_environment() -> dict[str, str]:
+    """With `python -P`, a child runs the package that this process runs, not what lies in its working directory."""
+    spec = importlib.util.find_spec("firmware_sim")
+    assert spec is not None and spec.origin is not None
+    home = str(Path(spec.origin).parent.parent)
+    paths = [home, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 def _describe(code: int) -> str:

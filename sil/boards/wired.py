@@ -17,5 +17,8 @@ class WiredBoard:
     def check_alive(self) -> None:
         """Nothing of ours to look after: only its silence tells."""
 
+    def post_mortem(self, error: Exception) -> str:
+        return str(error)
+
     def close(self) -> None:
         self.link.close()

@@ -53,4 +53,8 @@ class JournalRecorder:
         """The last record: why the run ended, and after how many ticks."""
         self._journal.add(Kind.END, tick, journal.json_payload({"reason": reason, "ticks": ticks}))
         self._journal.commit(tick)
+        self.close()
+
+    def close(self) -> None:
+        """No more rows; what was not committed is dropped."""
         self._journal.close()

@@ -1,0 +1,245 @@
+"""Replay: the recorded packets of a run into a fresh board; are its answers the same bytes?
+
+Per tick the board gets what it got then (the SAMPLE, or TICK where none reached it in time), and its COMMAND, TELEMETRY
+and EVENT frames are held against the recorded ones. It stops at the first difference, since every later sample answers
+a command that this board did not give. A changed parameter shows as a difference of CONFIG, which is reported apart.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import groupby
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from protocol import events, frames
+from protocol.frames import Command, Tick, Type
+from protocol.law_tables import COMMON
+from protocol.links import LinkError
+from protocol.port import Port
+from sil.boards import BoardOrder, plug_in
+from sil.configure import Orders
+from sil.rig import DEAD_AFTER_S, HELLO_WITHIN_S, law_orders, user_law_spec
+from sil.runs import PacketRow, Run
+from sil.scenario import Scenario, load_values
+from sil.session import Session
+from sil.trouble import LinkFailure, UsageError
+
+DELIVERED, LATE = "delivered", "late"
+ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
+LOOK_EVERY_S = 0.25
+
+
+class Difference(NamedTuple):
+    """The first frame that is not the recorded one; either side may be None (a frame too few or too many)."""
+
+    tick: int
+    recorded: bytes | None
+    replayed: bytes | None
+
+
+@dataclass
+class Report:
+    """What a replay found. `config`: CONFIG words that differ, as (name, recorded, now)."""
+
+    ticks: int = 0
+    sessions: int = 0
+    config: list[tuple[str, int, int]] = field(default_factory=list)
+    first: Difference | None = None
+
+    @property
+    def identical(self) -> bool:
+        """Every answer is the recorded one."""
+        return self.first is None
+
+
+def replay(
+    run: Run, sets: Iterable[str] = (), board: str = "inproc", progress: Callable[[int, int], None] | None = None
+) -> Report:
+    """Replay `run` into a fresh board of kind `board` (inproc, process), with overrides `a.b=value` of its scenario.
+
+    Raises UsageError (nothing to replay, bad override) and LinkFailure (the board fails or refuses).
+    """
+    scenario = recorded_scenario(run, sets)
+    made = law_orders(scenario)
+    report = Report()
+    for session in _sessions(run):
+        report.sessions += 1
+        try:
+            _replay_session(session, scenario, made, board, report, progress or (lambda tick, ticks: None), len(run))
+        except LinkError as error:
+            raise LinkFailure(str(error)) from None
+        if report.first is not None:
+            break
+    return report
+
+
+def recorded_scenario(run: Run, sets: Iterable[str] = ()) -> Scenario:
+    """The scenario that the log carries, with overrides; a user's own law is looked for where the run found it."""
+    if run.scenario.get("board") == "none" or not any(row.type == Type.SAMPLE for row in run.packets):
+        raise UsageError(f"{run.path}: no board took part in this run: there is nothing to replay")
+    law_file = run.summary.get("law_file") or ""
+    directory = Path(law_file).parent if law_file else Path()
+    values = {**run.scenario, "clock": "lockstep", "link": "pty"}
+    return load_values(values, tuple(sets), where=str(run.path), directory=directory)
+
+
+class RecordedTick(NamedTuple):
+    """One tick of the log: the SAMPLE as sent, whether the board stepped on it, and the answer frames in order."""
+
+    tick: int
+    sample: bytes | None
+    used: bool
+    answer: tuple[bytes, ...]
+
+
+class RecordedSession(NamedTuple):
+    """One board session: its CONFIG packets and its ticks."""
+
+    config: tuple[bytes, ...]
+    ticks: tuple[RecordedTick, ...]
+
+
+def _sessions(run: Run) -> Iterator[RecordedSession]:
+    starts = run.sessions or [0]
+    for number, start in enumerate(starts):
+        stop = starts[number + 1] if number + 1 < len(starts) else None
+        rows = [row for row in run.packets if row.tick >= start and (stop is None or row.tick < stop)]
+        config = tuple(row.packet for row in rows if row.type == Type.CONFIG)
+        ticks = tuple(_recorded(tick, list(group)) for tick, group in groupby(rows, key=lambda row: row.tick))
+        yield RecordedSession(config, tuple(tick for tick in ticks if tick.sample is not None))
+
+
+def _recorded(tick: int, rows: list[PacketRow]) -> RecordedTick:
+    sample = next((row for row in rows if row.type == Type.SAMPLE), None)
+    answer = tuple(row.packet for row in rows if row.direction == "down" and row.type in ANSWERS)
+    ordered = tuple(sorted(answer, key=lambda packet: int.from_bytes(packet[2:4], "little")))
+    used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
+    return RecordedTick(tick, sample.packet if sample else None, used, ordered)
+
+
+def _stepped_without(answer: tuple[bytes, ...]) -> bool:
+    """The board's own timer was first: it propagated, though neither an overrun nor an invalid reading made it."""
+    if not answer:
+        return False
+    try:
+        command: Command = frames.unpack(answer[0]).frame
+    except frames.BadPacket:
+        return False
+    own_timer = command.used in (frames.PROPAGATED, frames.REPEATED) and not command.flags & frames.FLAG_OVERRUN
+    return own_timer and not any(_is_invalid_reading(packet) for packet in answer)
+
+
+def _is_invalid_reading(packet: bytes) -> bool:
+    return packet[1] == Type.EVENT and frames.unpack(packet).frame.code == events.READING_INVALID
+
+
+# -- into the board ------------------------------------------------------------------------------------------------
+
+
+def _replay_session(
+    session: RecordedSession,
+    scenario: Scenario,
+    made: Orders,
+    board: str,
+    report: Report,
+    progress: Callable[[int, int], None],
+    ticks: int,
+) -> None:
+    host = plug_in(board, BoardOrder("pty", user_law_spec(scenario), None, lambda line: None))
+    try:
+        port = Port(host.link)
+        talk = Session(port, 0, host.check_alive)
+        talk.open(made.words, made.configuration.hash, HELLO_WITHIN_S, lambda line: None)
+        report.config = config_differences(session.config, made)
+        for recorded in session.ticks:
+            report.first = _replay_tick(port, recorded, host.check_alive)
+            if report.first is not None:
+                return
+            report.ticks += 1
+            progress(recorded.tick, ticks)
+        talk.close(frames.STOP_DONE)
+    finally:
+        host.close()
+
+
+def _replay_tick(port: Port, recorded: RecordedTick, check_alive: Callable[[], None]) -> Difference | None:
+    assert recorded.sample is not None
+    if recorded.used:
+        port.write(recorded.sample)
+    else:
+        port.send(Tick(recorded.tick))
+    answer = _answer(port, recorded.tick, check_alive)
+    if not recorded.used and _reached(recorded):
+        port.write(recorded.sample)  # it came after its tick was stepped: the board counts and drops it
+    if not recorded.answer:
+        return None  # the log ends before the answer
+    for expected, got in _side_by_side(recorded.answer, answer):
+        if expected != got:
+            return Difference(recorded.tick, expected, got)
+    return None
+
+
+def _reached(recorded: RecordedTick) -> bool:
+    """A delivered SAMPLE that the board's timer was faster than."""
+    return bool(recorded.answer) and _stepped_without(recorded.answer)
+
+
+def _side_by_side(recorded: tuple[bytes, ...], replayed: list[bytes]) -> Iterator[tuple[bytes | None, bytes | None]]:
+    for place in range(max(len(recorded), len(replayed))):
+        yield (
+            recorded[place] if place < len(recorded) else None,
+            replayed[place] if place < len(replayed) else None,
+        )
+
+
+def _answer(port: Port, tick: int, check_alive: Callable[[], None]) -> list[bytes]:
+    """COMMAND(tick) and the frames it announces."""
+    give_up = time.monotonic() + DEAD_AFTER_S
+    answer: list[bytes] = []
+    expected = 1
+    while len(answer) < expected:
+        packet = port.receive(LOOK_EVERY_S)
+        if packet is None:
+            check_alive()
+            if time.monotonic() > give_up:
+                raise LinkFailure(f"board: no answer to tick {tick} within {DEAD_AFTER_S:g} s")
+            continue
+        if packet.type == Type.COMMAND and packet.tick == tick:
+            expected = 1 + packet.frame.follows
+        if packet.type in ANSWERS:
+            answer.append(packet.raw)
+    return answer
+
+
+# -- reporting -----------------------------------------------------------------------------------------------------
+
+
+def config_differences(recorded: Iterable[bytes], made: Orders) -> list[tuple[str, int, int]]:
+    """CONFIG words that are not the recorded ones: (name, recorded, now)."""
+    then: dict[int, int] = {}
+    for packet in recorded:
+        part = frames.unpack(packet).frame
+        then.update(enumerate(part.words, start=part.offset))
+    names = [word.name for word in (*COMMON, *made.table.params)]
+    indices = sorted(set(then) | set(range(len(made.words))))
+    differences = []
+    for index in indices:
+        now = made.words[index] if index < len(made.words) else 0
+        if then.get(index, 0) != now:
+            name = names[index] if index < len(names) else f"guidance word {index - len(names)}"
+            differences.append((name, then.get(index, 0), now))
+    return differences
+
+
+def decoded(packet: bytes | None) -> str:
+    """A frame in words, for the report; "nothing" where there is none."""
+    if packet is None:
+        return "nothing"
+    try:
+        frame: Any = frames.unpack(packet).frame
+    except frames.BadPacket as error:
+        return f"{packet.hex(' ')} ({error})"
+    return f"{type(frame).__name__.upper()} {', '.join(f'{k}={v}' for k, v in frame._asdict().items())}"
