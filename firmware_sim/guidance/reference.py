@@ -39,25 +39,24 @@ RATE_LIMIT_48 = 1 << 46  # a quarter turn per sample: the largest rate the integ
 
 
 @register_jitable
-def restart_fixed(state: np.ndarray, position: np.ndarray, first: int) -> None:
-    """Begin anew at rest at position[first : first + 3], bam, from t_k on."""
-    for i in range(3):
-        y = position[first + i]
-        for field in (PAST, NOW, NEXT, AHEAD):
-            state[field + i] = y
-        state[HEAD + i] = shift_round(y, -16)
-        for field in (RATE_NOW, RATE_NEXT, ACCEL, HEAD_RATE):
-            state[field + i] = 0
+def restart_fixed(state: np.ndarray, i: int, position: int, rate: int) -> None:
+    """Axis i begins anew: it stays at `position` (bam) up to t_(k+lead) and goes on from there at `rate` (turn36)."""
+    for field in (PAST, NOW, NEXT, AHEAD):
+        state[field + i] = position
+    for field in (RATE_NOW, RATE_NEXT, ACCEL):
+        state[field + i] = 0
+    state[HEAD + i] = shift_round(position, -16)
+    state[HEAD_RATE + i] = shift_round(rate, -12)
 
 
 @register_jitable
-def restart_float(state: np.ndarray, position: np.ndarray, first: int) -> None:
-    """Begin anew at rest at position[first : first + 3], rad, from t_k on."""
-    for i in range(3):
-        for field in (PAST, NOW, NEXT, AHEAD, HEAD):
-            state[field + i] = position[first + i]
-        for field in (RATE_NOW, RATE_NEXT, ACCEL, HEAD_RATE):
-            state[field + i] = 0.0
+def restart_float(state: np.ndarray, i: int, position: float, rate: float) -> None:
+    """As restart_fixed(), in rad."""
+    for field in (PAST, NOW, NEXT, AHEAD, HEAD):
+        state[field + i] = position
+    for field in (RATE_NOW, RATE_NEXT, ACCEL):
+        state[field + i] = 0.0
+    state[HEAD_RATE + i] = rate
 
 
 @register_jitable
@@ -75,8 +74,8 @@ def advance_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     if state[STARTED] == 0:
         if inp[0] == 0:
             return False
-        restart_fixed(state, inp, 3)
         for i in range(3):
+            restart_fixed(state, i, inp[3 + i], 0)
             rate = mul_wide(par[START], wrap32(inp[19 + i] - inp[3 + i]), 30)
             state[HEAD_RATE + i] = clip(rate, -par[RATE_MAX], par[RATE_MAX])
         state[STARTED] = 1
@@ -122,8 +121,8 @@ def advance_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     if state[STARTED] == 0.0:
         if inp[0] == 0.0:
             return False
-        restart_float(state, inp, 3)
         for i in range(3):
+            restart_float(state, i, inp[3 + i], 0.0)
             rate = par[START] * wrap_pi(inp[19 + i] - inp[3 + i])
             state[HEAD_RATE + i] = min(max(rate, -par[RATE_MAX]), par[RATE_MAX])
         state[STARTED] = 1.0
