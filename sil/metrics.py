@@ -72,16 +72,15 @@ def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | 
 
 
 def reference_mismatch_deg(run: Run) -> float | None:
-    """Largest |board's reference - ours| over all ticks with TELEMETRY; NaN where ours is missing; None: no TELEMETRY.
+    """Largest |board's reference - ours| over the ticks with TELEMETRY from the reference's start on.
 
-    A run whose board has no reference model (user law without CONFIG, or `reference: none`) compares as it stands.
+    None: the board reported no reference. NaN: it reported one, and ours could not be made (no CONFIG in the log).
     """
     reported = run.reported("reference")
-    seen = np.isfinite(reported).all(axis=1)
-    if not seen.any():
+    if not np.isfinite(reported).any():
         return None
-    difference = wrapped_deg(reported[seen] - run.reference_deg[seen])
-    return float(np.abs(difference).max())
+    difference = np.abs(wrapped_deg(reported - run.reference_deg))
+    return float(np.nanmax(difference)) if np.isfinite(difference).any() else math.nan
 
 
 def judge(require: Iterable[Any], metrics: Mapping[str, Any]) -> list[Judgement]:
