@@ -51,10 +51,10 @@ class Board:
         self.announce()
         while not (once and self.stopped):
             self._hal.kick()
-            packet = self._hal.wait(self._timer_ns)
+            packet = self._hal.wait(self.timer_ns)
             if packet is not None:
                 self.handle(packet)
-            elif self._timer_ns is not None and self._hal.now() >= self._timer_ns:
+            elif self.timer_ns is not None and self._hal.now() >= self.timer_ns:
                 self.on_timer()
 
     def announce(self) -> None:
@@ -77,7 +77,7 @@ class Board:
         self._assembly = Assembly()
         self._ready: Ready | None = None
         self._flight: Flight | None = None
-        self._timer_ns: int | None = None
+        self.timer_ns: int | None = None
         self._next_tick = 0
 
     def _hello(self, echo: bool) -> Hello:
@@ -157,15 +157,15 @@ class Board:
     def on_timer(self) -> None:
         """The board's own timer: no SAMPLE came within sample_timeout of its expected arrival."""
         flight = self._flight
-        if flight is None or self._timer_ns is None:
+        if flight is None or self.timer_ns is None:
             return
-        self._timer_ns += self._wall_ns(flight.period_ns)
+        self.timer_ns += self._wall_ns(flight.period_ns)
         self._step(None)
 
     def _phase_timer(self, flight: Flight) -> None:
         """Each good SAMPLE re-phases the timer, so clock drift accumulates only in gaps."""
         if self._clock_rate_q16:
-            self._timer_ns = self._hal.now() + self._wall_ns(flight.period_ns + flight.sample_timeout_ns)
+            self.timer_ns = self._hal.now() + self._wall_ns(flight.period_ns + flight.sample_timeout_ns)
 
     def _wall_ns(self, simulated_ns: int) -> int:
         return simulated_ns * 65536 // self._clock_rate_q16

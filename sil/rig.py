@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from protocol import frames
-from protocol.channel import Clear
+from protocol.channel import Channel, Clear
 from protocol.law_tables import ConfigError, refusal
 from protocol.links import LinkError
 from protocol.port import Port
@@ -66,16 +66,24 @@ class Rig:
                 self.host.close()
 
 
-def assemble(scenario: Scenario, recorder: Recorder, log: Path | None, notify: Notify, wired: bool = False) -> Rig:
+def assemble(
+    scenario: Scenario,
+    recorder: Recorder,
+    log: Path | None,
+    notify: Notify,
+    wired: bool = False,
+    channel: Channel | None = None,
+) -> Rig:
     """Build everything; with a board, the session is open and the board READY. Raises SilError with one line.
 
     log: file for a board process's stderr. wired: somebody else starts the board, whatever the scenario says.
+    channel: what happens to frames on the way; None: the clear channel of `link.baud`.
     """
     try:
         clock = new_clock(scenario.clock)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
-        return _with_board(scenario, clock, recorder, log, notify, wired)
+        return _with_board(scenario, clock, recorder, log, notify, wired, channel or Clear(scenario.link.baud))
     except LinkError as error:
         raise LinkFailure(str(error)) from None
 
@@ -93,7 +101,13 @@ def law_orders(scenario: Scenario) -> Orders:
 
 
 def _with_board(
-    scenario: Scenario, clock: Clock, recorder: Recorder, log: Path | None, notify: Notify, wired: bool
+    scenario: Scenario,
+    clock: Clock,
+    recorder: Recorder,
+    log: Path | None,
+    notify: Notify,
+    wired: bool,
+    channel: Channel,
 ) -> Rig:
     made = law_orders(scenario)
     window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
@@ -110,7 +124,7 @@ def _with_board(
             made.words, made.configuration.hash, WIRED_WITHIN_S if wired else HELLO_WITHIN_S, notify
         )
         rig.config_packets = tuple(packets)
-        rig.answers = loop.board = _answers(scenario, rig, recorder)
+        rig.answers = loop.board = _answers(scenario, rig, recorder, channel)
         rig.loop = loop
     except LinkError as error:
         reason = host.post_mortem(error)
@@ -128,13 +142,13 @@ def record_config(rig: Rig, recorder: Recorder, tick: int) -> None:
         recorder.packet(tick, Direction.UP, Outcome.DELIVERED, packet)
 
 
-def _answers(scenario: Scenario, rig: Rig, recorder: Recorder) -> Answers:
+def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel) -> Answers:
     assert rig.orders is not None and rig.port is not None and rig.host is not None and rig.window is not None
     common = rig.orders.configuration.common
     model = ExecutionModel(scenario.period_ns, common["sample_timeout_us"] * 1000, common["answer_delay_us"] * 1000)
     return Answers(
         rig.port,
-        Clear(scenario.link.baud),
+        channel,
         model,
         rig.window,
         recorder,

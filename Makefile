@@ -1,0 +1,42 @@
+# make check = what CI runs = the README's test command. Everything it needs is installed by it.
+PYTHON ?= python3
+VENV   ?= .venv
+BIN     = $(VENV)/bin
+JOBS   ?= 2
+
+.PHONY: check lint types imports test golden bench clean
+
+check: lint types imports test
+
+$(VENV)/.installed: pyproject.toml tools/install-system
+	tools/install-system
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet --editable ".[dev]"
+	touch $@
+
+tests/e2e/node_modules/.installed: tests/e2e/package.json tests/e2e/package-lock.json
+	cd tests/e2e && npm ci --silent --no-audit --no-fund
+	touch $@
+
+lint: $(VENV)/.installed
+	$(BIN)/ruff check .
+
+types: $(VENV)/.installed
+	$(BIN)/mypy
+
+imports: $(VENV)/.installed
+	$(BIN)/lint-imports
+
+test: $(VENV)/.installed tests/e2e/node_modules/.installed
+	$(BIN)/python -m pytest -n $(JOBS) --durations=10
+
+golden: $(VENV)/.installed
+	$(BIN)/python -m tools.make_vectors
+	$(BIN)/python -m tools.spec_tables --write
+
+bench: $(VENV)/.installed
+	$(BIN)/python -m tools.bench.lockstep
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info tests/e2e/node_modules

@@ -1,0 +1,254 @@
+"""The board's half of the timing contract: every tick is stepped exactly once and answered, whatever arrives."""
+
+from __future__ import annotations
+
+import pytest
+from conftest import BoardBench, commands, events_of, make_sample, telemetry
+
+from protocol import events, frames
+from protocol.law_tables import TELEMETRY_COMMON
+
+LOST, OVERRUNS, DROPPED = (
+    [word.name for word in TELEMETRY_COMMON].index(name) for name in ("samples_lost", "overruns", "dropped")
+)
+
+
+def used(answers):
+    return [(command.tick, command.used) for command in commands(answers)]
+
+
+def test_a_sample_is_answered_with_its_tick(bench):
+    board = bench()
+    for tick in range(5):
+        assert used(board.sample(tick)) == [(tick, frames.USED)]
+
+
+def test_the_answer_is_command_then_telemetry_then_events_and_command_counts_them(bench):
+    board = bench(telemetry_every=2)
+    for tick in range(6):
+        answer = board.sample(tick, valid=0 if tick == 5 else 7)
+        names = [type(frame).__name__ for frame in answer]
+        assert names == sorted(names, key=["Command", "Telemetry", "Event"].index)
+        assert answer[0].follows == len(answer) - 1
+        assert bool(telemetry(answer)) == (tick % 2 == 0)
+
+
+def test_tick_steps_without_a_sample_and_is_answered(bench):
+    board = bench()
+    board.sample(0)
+    answer = board.tick(1)
+    assert used(answer) == [(1, frames.PROPAGATED)]
+    assert [e.code for e in events_of(answer)] == [events.SAMPLE_LOST]
+
+
+def test_a_law_without_a_model_repeats_its_last_command_and_flags_it(bench):
+    board = bench("pd")
+    for tick in range(4):
+        last = commands(board.sample(tick, readings=make_sample(0).readings))[-1]
+    answer = commands(board.tick(4))
+    assert answer[0].used == frames.REPEATED
+    assert answer[0].torque == last.torque != (0, 0, 0)
+
+
+def test_a_law_with_a_model_propagates_and_does_not_reuse_the_stale_reading(bench):
+    """If the stale reading were taken as fresh, a second board that does get it again would answer the same."""
+    lossy, reused = bench(), bench()
+    for tick in range(12):
+        reading = (11930465 + 400_000 * tick * tick, 0, 0)
+        sample = make_sample(tick)
+        sample = sample._replace(readings=(sample.readings[0]._replace(values=reading), *sample.readings[1:]))
+        lossy.send(sample)
+        reused.send(sample)
+    stale = sample._replace(tick=12)
+    lossy_answer, reused_answer = commands(lossy.tick(12)), commands(reused.send(stale))
+    assert lossy_answer[0].used == frames.PROPAGATED
+    assert lossy_answer[0].torque != reused_answer[0].torque
+
+
+def test_an_invalid_reading_counts_as_lost(bench):
+    board = bench()
+    board.sample(0)
+    answer = board.sample(1, valid=6)  # Euler angles invalid
+    assert used(answer) == [(1, frames.PROPAGATED)]
+    assert [e.code for e in events_of(answer)] == [events.READING_INVALID, events.SAMPLE_LOST]
+
+
+def test_a_sample_for_a_tick_already_stepped_is_counted_and_dropped(bench):
+    board = bench()
+    board.sample(0)
+    board.tick(1)
+    assert board.sample(1) == []
+    answer = board.sample(2)
+    assert used(answer) == [(2, frames.USED)]
+    assert telemetry(answer)[0].words[DROPPED] == 1
+    assert events.STALE_SAMPLE in [e.code for e in events_of(answer)]
+
+
+@pytest.mark.parametrize("ahead", [1, 2, 3, 4])
+def test_a_sample_ahead_by_up_to_four_is_propagated_up_to(bench, ahead):
+    board = bench()
+    board.sample(0)
+    answer = board.sample(1 + ahead)
+    assert used(answer) == [(1 + i, frames.PROPAGATED) for i in range(ahead)] + [(1 + ahead, frames.USED)]
+
+
+def test_a_sample_further_ahead_restarts_bumplessly(bench):
+    board = bench()
+    for tick in range(10):
+        before = commands(board.sample(tick))[-1]
+    assert before.torque != (0, 0, 0)
+    answer = board.sample(15)
+    assert used(answer) == [(15, frames.RESTARTED)]
+    restarted = [e for e in events_of(answer) if e.code == events.RESTARTED]
+    assert [(e.a, e.b) for e in restarted] == [(10, 15)]
+    assert commands(answer)[0].torque == (0, 0, 0)  # appc begins with four quiet samples
+    assert used(board.sample(16)) == [(16, frames.USED)]
+
+
+def test_identification_resumes_after_three_consecutive_good_samples(bench):
+    board = bench()
+    for tick in range(30):
+        board.sample(tick)
+    assert not commands(board.sample(30))[0].flags & frames.FLAG_IDENTIFICATION_PAUSED
+    board.tick(31)
+    paused = [bool(commands(board.sample(t))[0].flags & frames.FLAG_IDENTIFICATION_PAUSED) for t in range(32, 37)]
+    assert paused == [True, True, False, False, False]
+
+
+def test_the_link_watchdog_commands_zero_after_link_limit_ticks_and_recovers(bench):
+    board = bench(link_limit=5)
+    for tick in range(10):
+        board.sample(tick)
+    silent = [commands(board.tick(tick))[0] for tick in range(10, 18)]
+    flagged = [bool(c.flags & frames.FLAG_WATCHDOG) for c in silent]
+    assert flagged == [False] * 4 + [True] * 4
+    assert all(c.torque == (0, 0, 0) for c in silent[4:])
+    answer = board.sample(18)
+    assert not commands(answer)[0].flags & frames.FLAG_WATCHDOG
+    assert events.WATCHDOG_OFF in [e.code for e in events_of(answer)]
+
+
+def test_lockstep_has_no_timer(bench):
+    board = bench()
+    board.sample(0)
+    assert board.board.timer_ns is None
+
+
+def test_the_timer_fires_sample_timeout_after_the_expected_arrival_and_each_sample_rephases_it(bench):
+    board = bench(clock_rate_q16=65536, period_us=500_000, sample_timeout_us=100_000)
+    board.hal.time_ns = 1_000
+    board.sample(0)
+    assert board.board.timer_ns == 1_000 + 600_000_000
+    board.hal.time_ns = 503_000_000  # 3 ms of drift
+    board.sample(1)
+    assert board.board.timer_ns == 503_000_000 + 600_000_000
+
+
+def test_the_timer_steps_a_missing_tick_and_goes_on_at_the_period(bench):
+    board = bench(clock_rate_q16=65536, period_us=500_000, sample_timeout_us=100_000)
+    board.sample(0)
+    assert used(board.timer()) == [(1, frames.PROPAGATED)]
+    assert board.board.timer_ns == 600_000_000 + 500_000_000
+    assert used(board.timer()) == [(2, frames.PROPAGATED)]
+    assert board.sample(1) == []  # too late: stepped already
+    assert used(board.sample(3)) == [(3, frames.USED)]
+
+
+def test_the_timer_runs_at_the_clock_rate_of_hello(bench):
+    board = bench(clock_rate_q16=20 * 65536, period_us=500_000, sample_timeout_us=100_000)
+    board.sample(0)
+    assert board.board.timer_ns == 600_000_000 // 20
+
+
+def test_an_overrun_is_counted_and_propagated_over(bench):
+    """T_s 0.3 s, 0.345 s of work: sample 1 finds the one-deep mailbox taken."""
+    board = bench(period_us=300_000, answer_delay_us=345_000)
+    assert used(board.sample(0)) == [(0, frames.USED)]
+    answer = board.sample(1)
+    assert used(answer) == [(1, frames.PROPAGATED)]
+    assert commands(answer)[0].flags & frames.FLAG_OVERRUN
+    assert telemetry(answer)[0].words[OVERRUNS] == 1
+    assert events.OVERRUN in [e.code for e in events_of(answer)]
+
+
+def test_no_overrun_when_the_work_fits_the_period(bench):
+    board = bench(period_us=400_000, answer_delay_us=345_000)
+    assert [used(board.sample(tick)) for tick in range(5)] == [[(tick, frames.USED)] for tick in range(5)]
+
+
+def test_busy_time_is_computed_from_ticks_and_transit(bench):
+    """The second sample would arrive 1 ms too early but for its longer way."""
+    board = bench(period_us=300_000, answer_delay_us=301_000)
+    board.sample(0, transit_us=0)
+    assert used(board.sample(1, transit_us=1_000)) == [(1, frames.USED)]
+
+
+# -- session ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_same_nonce_is_only_answered_again_and_a_new_one_resets():
+    board = BoardBench().open(nonce=7)
+    board.sample(0)
+    (hello,) = board.hello(7)
+    assert hello.flags & frames.HELLO_CONFIGURED
+    assert used(board.sample(1)) == [(1, frames.USED)]
+    (hello,) = board.hello(8)
+    assert hello.nonce == 8
+    assert not hello.flags & frames.HELLO_CONFIGURED
+
+
+def test_an_unconfigured_board_answers_anything_with_hello():
+    board = BoardBench()
+    for answer in (board.sample(0), board.tick(0), board.configure()[:1]):
+        (hello,) = answer
+        assert isinstance(hello, frames.Hello)
+        assert not hello.flags & frames.HELLO_ECHO
+    board.hello(7)
+    (hello,) = board.sample(0)  # greeted, yet not configured
+    assert isinstance(hello, frames.Hello)
+
+
+def test_config_is_idempotent():
+    board = BoardBench()
+    board.hello(7)
+    board.lab.reset()
+    first = board.configure()[-1]
+    again = board.configure()
+    assert first.status == frames.READY_OK
+    assert all(ready == first for ready in again)
+    assert used(board.sample(0)) == [(0, frames.USED)]
+
+
+def test_warm_up_leaves_no_trace(bench):
+    """READY means compiled and warm; the first answers are those of a board that was configured twice as well."""
+    once, twice = bench(), bench()
+    twice.hello(9)
+    twice.lab.reset()
+    twice.configure()
+    for tick in range(10):
+        assert once.sample(tick) == twice.sample(tick)
+
+
+def test_stop_forgets_the_session(bench):
+    board = bench()
+    board.send(frames.Stop(frames.STOP_DONE))
+    assert board.board.stopped
+    (hello,) = board.sample(0)
+    assert isinstance(hello, frames.Hello)
+
+
+def test_a_bad_word_is_named_by_its_index():
+    board = BoardBench()
+    board.words = (*board.words[:3], 5, *board.words[4:])  # period_us: 5 us
+    board.hello(7)
+    board.lab.reset()
+    (ready,) = board.configure()
+    assert (ready.status, ready.index) == (frames.READY_BAD_WORD, 3)
+
+
+def test_a_law_that_supports_one_delay_refuses_others():
+    board = BoardBench("appc", transport_delay_ticks=2)
+    board.hello(7)
+    board.lab.reset()
+    (ready,) = board.configure()
+    assert ready.status == frames.READY_LAW_REFUSES
