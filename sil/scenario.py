@@ -334,6 +334,7 @@ def _files(scenario: Scenario) -> Iterator[Problem]:
         return
     if scenario.board != "none":
         yield _problem(scenario, "schedule", "a schedule with board none only", f"board {scenario.board}")
+        return
     file = scenario.file_of("schedule")
     if file is None or not file.is_file():
         yield _problem(scenario, "schedule", "a CSV file that exists", scenario.schedule)

@@ -112,7 +112,7 @@ def _refused(param: Param, value: object) -> str | None:
         items = value if isinstance(value, tuple | list) else (value,) * 3
         fits = len(items) == 3 and not any(_bad(w, item) for w, item in zip(param.words, items, strict=True))
         return None if fits else f"3 numbers {_range(word)}"
-    return _expected(word) if _bad(word, value) else None
+    return _expected(word, value) if _bad(word, value) else None
 
 
 def _bad(word: Word, value: object) -> bool:
@@ -132,11 +132,11 @@ def _most(word: Word) -> float:
     return math.inf if isinstance(word.q, str) else INT32_MAX * (word.lsb or math.ldexp(1.0, -word.q))
 
 
-def _expected(word: Word) -> str:
+def _expected(word: Word, got: object) -> str:
     if word.choices == OFF_ON:
         return "true or false"
     if word.choices:
-        return one_of(word.choices)
+        return one_of(word.choices, got)
     return f"a number {_range(word)}"
 
 
