@@ -28,6 +28,11 @@ class Link(ABC):
     url: str = ""
     strangers: int = 0  # datagrams from somebody else, dropped
 
+    @property
+    def peer_url(self) -> str:
+        """The same as `url`, for readers who wonder whose it is."""
+        return self.url
+
     @classmethod
     @abstractmethod
     def open(cls, url: str, listen: bool) -> Link:

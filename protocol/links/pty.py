@@ -33,7 +33,7 @@ class PtyLink(StreamLink):
         fcntl.ioctl(fd, TIOCSPTLCK, bytes(4))
         tty.setraw(fd, termios.TCSANOW)  # on the master: it sets the pair's one line discipline
         self.peer_path = f"/dev/pts/{number}"
-        self.peer_url = self.url = f"serial://{self.peer_path}"
+        self.url = f"serial://{self.peer_path}"
         super().__init__(fd, f"pty {self.peer_path}")
 
     @classmethod

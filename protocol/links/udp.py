@@ -11,6 +11,7 @@ from urllib.parse import urlsplit
 from protocol import frames
 from protocol.link import Link, LinkClosed, LinkError, Waiter
 
+STOP = bytes((frames.Type.STOP,))
 PEER_SILENCE_S = 3.0  # after this, a HELLO from somebody else takes the board over
 
 
@@ -168,6 +169,8 @@ class UdpBoard(UdpLink):
             return b""
         if sender == self._peer:
             self._heard_s = time.monotonic()
+            if data[1:2] == STOP and frames.has_right_crc(data):
+                self.release()
             return data
         return data if self._welcome(data, sender) else b""
 
