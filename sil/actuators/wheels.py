@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sil import jit
 from sil.signals import Vector
 
 if TYPE_CHECKING:
@@ -24,7 +25,8 @@ class Wheels:
     """The actuator `wheels`; limits are per axis, math.inf for none."""
 
     def __init__(self, torque_max_Nm: tuple[float, ...], momentum_max_Nms: tuple[float, ...]) -> None:
-        self._limits = tuple(zip(torque_max_Nm, momentum_max_Nms, strict=True))
+        self._torque_max, self._momentum_max = np.array(torque_max_Nm), np.array(momentum_max_Nms)
+        self.limit(np.zeros(3), np.zeros(3), 1.0)  # compile, or load, now
 
     @classmethod
     def from_scenario(cls, scenario: Scenario) -> Wheels:
@@ -37,14 +39,16 @@ class Wheels:
 
     def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float) -> Vector:
         """Torque (3,) N m on the body for the coming `period_s`, given the wheel momentum (3,) N m s now."""
-        applied = [
-            _limit(command, h, *limits, period_s)
-            for command, h, limits in zip(command_Nm.tolist(), momentum_B.tolist(), self._limits, strict=True)
-        ]
-        return np.array(applied)
+        applied = np.empty(3)
+        _limit(command_Nm, momentum_B, self._torque_max, self._momentum_max, period_s, applied)
+        return applied
 
 
-def _limit(command: float, h: float, torque_max: float, momentum_max: float, period_s: float) -> float:
-    lowest = max(-torque_max, min(0.0, (h - momentum_max) / period_s))  # brings h up to +momentum_max
-    highest = min(torque_max, max(0.0, (h + momentum_max) / period_s))  # brings h down to -momentum_max
-    return min(max(command, lowest), highest)
+@jit.compile
+def _limit(
+    command: Vector, h: Vector, torque_max: Vector, momentum_max: Vector, period_s: float, applied: Vector
+) -> None:
+    for i in range(3):
+        lowest = max(-torque_max[i], min(0.0, (h[i] - momentum_max[i]) / period_s))  # brings h up to +momentum_max
+        highest = min(torque_max[i], max(0.0, (h[i] + momentum_max[i]) / period_s))  # brings h down to -momentum_max
+        applied[i] = min(max(command[i], lowest), highest)
