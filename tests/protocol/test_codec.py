@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 from hypothesis import given
 from hypothesis import strategies as st
 from wire_examples import ONE_OF_EACH, any_frame
@@ -37,7 +39,7 @@ def test_any_cut_gives_the_same_frames_and_counters(parts: list[bytes], cuts: li
     stream = b"".join(parts)
     edges = [0, *sorted(cut % (len(stream) + 1) for cut in cuts), len(stream)]
     whole, one = decoded([stream])
-    cut, many = decoded([stream[a:b] for a, b in zip(edges, edges[1:], strict=False)])
+    cut, many = decoded([stream[a:b] for a, b in itertools.pairwise(edges)])
     bytewise, single = decoded([stream[i : i + 1] for i in range(len(stream))])
     assert whole == cut == bytewise
     assert one.counters == many.counters == single.counters
