@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
 
@@ -13,8 +14,9 @@ from sil.checks import check, wire_times_s
 from sil.configure import orders
 from sil.plants.rigid import Rigid
 from sil.profiles import PROFILES, setpoints
-from sil.scenario import load_scenario
+from sil.scenario import load_scenario, load_values
 from sil.scenario_sections import Guidance
+from sil.scenario_table import markdown, non_defaults
 from sil.scenarios import list_scenarios
 from sil.schedule import read_schedule
 
@@ -159,3 +161,22 @@ def test_every_profile_gives_ascending_rows_within_the_run(profile: str) -> None
     rows = setpoints(Guidance.model_validate(guidance), 0.5, 4000)
     assert [row.tick for row in rows] == sorted({row.tick for row in rows})
     assert all(0 <= row.tick < 4000 for row in rows)
+
+
+# -- the table in the docs --------------------------------------------------------------------------------------------
+
+
+def test_the_table_in_the_docs_is_current() -> None:
+    """Make it again with: python -m sil.scenario_table > docs/SCENARIOS.md"""
+    assert (Path(__file__).parents[3] / "docs" / "SCENARIOS.md").read_text(encoding="utf-8") == markdown()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_the_table_says_is_all_that_differs(name: str) -> None:
+    """A scenario made of the defaults and the rows of the table is the same scenario."""
+    scenario = load_scenario(name)
+    sets = [f"{key}={json.dumps(value)}" for key, value in non_defaults(scenario).items() if key != "schedule"]
+    again = load_values({"law": {"name": scenario.law.name}}, sets).resolved()
+    for key, value in scenario.resolved().items():
+        if key not in ("name", "about", "require", "schedule"):
+            assert again[key] == value
