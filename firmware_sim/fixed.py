@@ -189,3 +189,11 @@ def atan2_q(y: int, x: int) -> int:
     if x < 0:
         a = 2147483648 - a
     return wrap32(a if y >= 0 else -a)
+
+
+@register_jitable
+def keep32(x: int, state: list[int], flag: int) -> int:
+    """x limited to int32; state[flag] becomes 1 if that changed it. For what must never wrap silently."""
+    if x < -2147483648 or x > 2147483647:
+        state[flag] = 1
+    return sat32(x)

@@ -7,7 +7,10 @@ from typing import Protocol
 
 import numpy as np
 
+from firmware_sim.controllers.compiled import LawRefuses
 from protocol.law_tables import Configuration
+
+__all__ = ["LAWS", "SUPPORT", "Law", "LawRefuses", "new_law", "user_law"]
 
 LAWS: dict[str, str] = {
     "pd": "firmware_sim.controllers.pd:Pd",
@@ -15,11 +18,7 @@ LAWS: dict[str, str] = {
     "appc": "firmware_sim.controllers.appc:Appc",
 }
 # Files of this folder that are not laws.
-SUPPORT = ("inputs", "kinematics", "user")
-
-
-class LawRefuses(ValueError):
-    """The law cannot fly with this configuration; the message says why in one line."""
+SUPPORT = ("compiled", "gyroscopic", "inputs", "kinematics", "user")
 
 
 class Law(Protocol):

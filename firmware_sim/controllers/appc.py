@@ -1,27 +1,53 @@
-"""appc: adaptive pole placement with an observer, a model in body axes and one filtered gain per axis.
+"""appc: adaptive pole placement with an observer; nothing is cancelled, one filtered gain g per axis is identified.
 
-(float form for now)
+Angles eta = [phi, theta, psi]; y^, v^, w^: attitude, rate per sample and disturbance (rad, rad/sample, rad/sample^2);
+u(k): torque that acts from t_k on, u(k) = command(k-1) unless the laboratory reports otherwise; I = I0 / g;
+FWD, INV: kinematics.py; Gamma: gyroscopic torque at the same instant, 0 without `gyro`. At tick k:
+
+    1 observe   alpha = FWD(y^, v^, (u(k-1) - Gamma) T_s^2 / I) + w^; y^ += v^ + alpha/2; v^ += alpha
+                e = y(k) - y^;  y^ += L1 e; v^ += L2 e; w^ += L3 e          (skipped without a reading)
+    2 adapt     z = y(k) - 2 y(k-1) + y(k-2);  x = INV(y^(k-1), v^(k-1), z);  c = (u(k-1) + u(k-2)) T_s^2 / (2 I0)
+                both through two lowpasses (pole 0.8), minus a slow lowpass (pole 0.97); then, if |c| > 1e-4,
+                P = min(P + 1e-6, 0.1); G = P c / (1e-7 + c^2 P); g += G (x - c g); P -= G c P; 0.6 <= g <= 1.7
+    3 predict   y', v' for t_(k+1) as in 1 with u(k)
+    4 place     nu = am - K1 (y' - ym(k+1)) - K2 (v' - vm(k+1)) - w^;  command = clip(I INV(y', v', nu) / T_s^2 + Gamma)
+    Gamma       gyroscopic.py; h = wheel momentum as reported, without a SAMPLE propagated by -u T_s
+
+Start: four ticks of zero torque while the observer settles; the reference waits at y^ and then leaves from y^ + v^ with
+rate v^, so the first command does not jump. Adaptation begins at tick 25 and rests until three readings in a row came.
+Gains: K1 = (1-pc)^2, K2 = (1-pc)(3+pc)/2 (double pole pc); L = 1-po^3, 1.5 (1-po)^2 (1+po), (1-po)^3 (triple pole po).
+Fixed form: y bam; v, w, accelerations turn36; u, h Q28; g Q28, P Q34; the regression in rad Q35.
+Source: study of paper 004, section 3.1 (there: BEST). Transport delay: exactly one sample. Needs Euler angles.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numba.extending import register_jitable
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, Step, offsets
-from firmware_sim.controllers.kinematics import forward_float, inverse_float
-from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_float, wrap_pi
-from protocol.law_tables import Configuration
+from firmware_sim.controllers.compiled import CompiledLaw, Field, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.gyroscopic import gyro_fixed, gyro_float
+from firmware_sim.controllers.kinematics import (
+    demand_fixed,
+    drive_fixed,
+    forward_fixed,
+    forward_float,
+    inverse_fixed,
+    inverse_float,
+)
+from firmware_sim.fixed import INV_TWO_PI_Q34, add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
+from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_fixed, restart_float, wrap_pi
+from protocol.law_tables import APPC, AXES, Configuration
 
 STATE = (
     Field("y", 3, "turn", 32),
     Field("v", 3, "turn/sample", 36),
     Field("w", 3, "turn/sample^2", 36),
     Field("g", 3, "1", 28),
+    Field("g_inverse", 3, "1", 28),
     Field("P", 3, "1", 34),
     Field("applied", 3, "N m", 28),
     Field("applied_before", 3, "N m", 28),
@@ -29,160 +55,345 @@ STATE = (
     Field("reading", 3, "turn", 32),
     Field("reading_before", 3, "turn", 32),
     Field("innovation", 3, "turn", 32),
-    Field("h", 3, "N m s", 28),
+    Field("momentum", 3, "N m s", 28),
     Field("response", 9, "turn/sample^2", 36),
     Field("drive", 9, "turn/sample^2", 36),
     Field("steps", 1, "tick", 0),
     Field("restarted", 1, "", 0),
+    Field("arithmetic", 1, "", 0),
 )
-Y, V, W, G, P, APPLIED, BEFORE, COMMAND, READING, READING_BEFORE, INNOVATION, H, RESPONSE, DRIVE, STEPS, RESTARTED = offsets(STATE)
-TS, K1, K2, L1, L2, L3, LIMIT, I0, ADAPT, GYRO, W0 = 0, 1, 2, 3, 4, 5, 6, 9, 12, 13, 14
+(Y, V, W, G, G_INV, P, APPLIED, BEFORE, COMMAND, READING, READING_BEFORE, INNOVATION, H, RESPONSE, DRIVE, STEPS,
+ RESTARTED, ARITHMETIC) = offsets(STATE)  # fmt: skip
+
+# Parameters of both forms; fixed: Q30, torque Q28, DRIVE_* and DEMAND_* mantissas and shifts (kinematics.py).
+TS, TS_INV, K1, K2, L1, L2, L3, ADAPT, GYRO, ORBIT, TORQUE_SHIFT, MOMENTUM_SHIFT = range(12)
+LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT = 12, 15, 18, 21, 24
+PARAMETERS = 27
 
 START_STEPS = 4
+LEARN_FROM = 25
+STEPS_MAX = 1000000
+
+
+@register_jitable
+def _triple(s: np.ndarray, first: int) -> tuple[float, float, float]:
+    return s[first], s[first + 1], s[first + 2]
+
+
+# -- float reference ---------------------------------------------------------------------------------------------------
 
 
 @register_jitable
 def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    out[:] = 0.0
-    s[RESTARTED] = 0.0
+    """One tick; par TORQUE_OF = I0 / T_s^2, DRIVE_OF = T_s^2 / I0."""
+    out[0], out[1], out[2], out[3], s[RESTARTED] = 0.0, 0.0, 0.0, 0.0, 0.0
     fresh = inp[0] != 0.0
-    if s[STEPS] == 0.0:
-        if not fresh:
-            out[3] = 32.0
-            return
-        for i in range(3):
-            s[Y + i] = s[READING + i] = s[READING_BEFORE + i] = inp[3 + i]
-    ts2 = par[TS] * par[TS]
-    h, gy, b, a, eta, v = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for i in range(3):
-        eta[i] = s[Y + i]
-        v[i] = s[V + i]
-    # observer
+    if s[STEPS] == 0.0 and not fresh:
+        out[3] = 32.0
+        return
+    angles, rates = _triple(s, Y), _triple(s, V)
     if s[STEPS] > 0.0:
-        for i in range(3):
-            h[i] = s[H + i]
-            gy[i] = 0.0
-        if par[GYRO] != 0.0:
-            _gyro_float(s, par, eta, v, h, gy)
-        for i in range(3):
-            b[i] = (s[APPLIED + i] - gy[i]) * s[G + i] / par[I0 + i] * ts2
-        forward_float(eta, v, b, a)
-        for i in range(3):
-            alpha = a[i] + s[W + i]
-            s[Y + i] += s[V + i] + 0.5 * alpha
-            s[V + i] += alpha
-        for i in range(3):
-            s[H + i] -= s[APPLIED + i] * par[TS]
+        _propagate_float(s, par)
     if fresh:
-        for i in range(3):
-            e = wrap_pi(inp[3 + i] - s[Y + i])
-            s[INNOVATION + i] = e
-            s[Y + i] += par[L1] * e
-            s[V + i] += par[L2] * e
-            s[W + i] += par[L3] * e
-            s[H + i] = inp[16 + i]
-    # adaptation
-    if par[ADAPT] != 0.0 and fresh and inp[1] >= min(3.0, s[STEPS] + 1.0):
-        for i in range(3):
-            b[i] = wrap_pi(inp[3 + i] - s[READING + i]) - wrap_pi(s[READING + i] - s[READING_BEFORE + i])
-        inverse_float(eta, v, b, a)
-        for i in range(3):
-            ph = 0.5 * (s[APPLIED + i] + s[BEFORE + i]) * ts2 / par[I0 + i]
-            z = _washed_float(s, RESPONSE + 3 * i, a[i])
-            ph = _washed_float(s, DRIVE + 3 * i, ph)
-            if abs(ph) > 1e-4 and s[STEPS] > 24.0:
-                p = min(s[P + i] + 1e-6, 0.1)
-                gain = p * ph / (1e-7 + ph * ph * p)
-                g = s[G + i] + gain * (z - ph * s[G + i])
-                s[P + i] = p - gain * ph * p
-                s[G + i] = min(max(g, 0.6), 1.7)
-    # what acts now
+        _correct_float(s, par, inp)
+    if par[ADAPT] != 0.0:
+        if fresh and inp[1] >= min(3.0, s[STEPS] + 1.0):
+            _adapt_float(s, par, inp, angles, rates)
+        else:
+            out[3] += 4.0
     for i in range(3):
         s[BEFORE + i] = s[APPLIED + i]
         s[APPLIED + i] = inp[13 + i] if inp[2] != 0.0 else s[COMMAND + i]
         if fresh:
-            s[READING_BEFORE + i] = s[READING + i]
-            s[READING + i] = inp[3 + i]
-    # prediction
-    for i in range(3):
-        eta[i] = s[Y + i]
-        v[i] = s[V + i]
-        h[i] = s[H + i]
-        gy[i] = 0.0
-    if par[GYRO] != 0.0:
-        _gyro_float(s, par, eta, v, h, gy)
-    for i in range(3):
-        b[i] = (s[APPLIED + i] - gy[i]) * s[G + i] / par[I0 + i] * ts2
-    forward_float(eta, v, b, a)
-    for i in range(3):
-        alpha = a[i] + s[W + i]
-        eta[i] += v[i] + 0.5 * alpha
-        v[i] += alpha
+            s[READING_BEFORE + i], s[READING + i] = s[READING + i], inp[3 + i]
     if s[STEPS] < START_STEPS:
+        last = s[STEPS] == START_STEPS - 1
         for i in range(3):
-            if s[STEPS] < START_STEPS - 1:
-                restart_float(ref, i, s[Y + i], 0.0)
-            else:
-                restart_float(ref, i, s[Y + i] + s[V + i], s[V + i])
-        s[RESTARTED] = 1.0
-        s[STEPS] += 1.0
-        for i in range(3):
+            restart_float(ref, i, s[Y + i] + (s[V + i] if last else 0.0), s[V + i] if last else 0.0)
             s[COMMAND + i] = 0.0
-        out[3] = 32.0
-        return
-    s[STEPS] = min(s[STEPS] + 1.0, 1000.0)
-    for i in range(3):
-        e1 = wrap_pi(eta[i] - ref[NEXT + i])
-        e2 = v[i] - ref[RATE_NEXT + i]
-        a[i] = ref[ACCEL + i] - par[K1] * e1 - par[K2] * e2 - s[W + i]
-    inverse_float(eta, v, a, b)
-    for i in range(3):
-        a[i] = b[i] * par[I0 + i] / s[G + i] / ts2
+        s[RESTARTED] = 1.0
+        out[3] += 32.0
+    else:
+        _place_float(s, par, ref, out)
+    s[STEPS] = min(s[STEPS] + 1.0, 1e6)
+
+
+@register_jitable
+def _acceleration_float(s: np.ndarray, par: np.ndarray) -> tuple[float, float, float]:
+    """alpha at (y^, v^) with the torque that acts now."""
+    angles, rates = _triple(s, Y), _triple(s, V)
+    gyro = (0.0, 0.0, 0.0)
     if par[GYRO] != 0.0:
-        for i in range(3):
-            h[i] = s[H + i] - s[APPLIED + i] * par[TS]
-        _gyro_float(s, par, eta, v, h, gy)
-        for i in range(3):
-            a[i] += gy[i]
+        gyro = gyro_float(_inertia_float(s, par), par[TS], par[ORBIT], angles, rates, _triple(s, H))
+    x = (s[APPLIED] - gyro[0]) * s[G] * par[DRIVE_OF]
+    y = (s[APPLIED + 1] - gyro[1]) * s[G + 1] * par[DRIVE_OF + 1]
+    z = (s[APPLIED + 2] - gyro[2]) * s[G + 2] * par[DRIVE_OF + 2]
+    a = forward_float(angles, rates, (x, y, z))
+    return a[0] + s[W], a[1] + s[W + 1], a[2] + s[W + 2]
+
+
+@register_jitable
+def _inertia_float(s: np.ndarray, par: np.ndarray) -> tuple[float, float, float]:
+    """I / T_s^2."""
+    return par[TORQUE_OF] / s[G], par[TORQUE_OF + 1] / s[G + 1], par[TORQUE_OF + 2] / s[G + 2]
+
+
+@register_jitable
+def _propagate_float(s: np.ndarray, par: np.ndarray) -> None:
+    alpha = _acceleration_float(s, par)
     for i in range(3):
-        u = min(max(a[i], -par[LIMIT + i]), par[LIMIT + i])
-        if u != a[i]:
-            out[3] = 1.0
-        s[COMMAND + i] = u
-        out[i] = u
+        s[Y + i] += s[V + i] + 0.5 * alpha[i]
+        s[V + i] += alpha[i]
+        s[H + i] -= s[APPLIED + i] * par[TS]
+        s[INNOVATION + i] = 0.0
 
 
 @register_jitable
-def _washed_float(s: np.ndarray, first: int, x: float) -> float:
-    s[first] += 0.2 * (x - s[first])
-    s[first + 1] += 0.2 * (s[first] - s[first + 1])
-    s[first + 2] += 0.03 * (s[first + 1] - s[first + 2])
-    return s[first + 1] - s[first + 2]
+def _correct_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
+    for i in range(3):
+        if s[STEPS] == 0.0:
+            s[Y + i], s[READING + i], s[READING_BEFORE + i] = inp[3 + i], inp[3 + i], inp[3 + i]
+        e = wrap_pi(inp[3 + i] - s[Y + i])
+        s[INNOVATION + i] = e
+        s[Y + i] += par[L1] * e
+        s[V + i] += par[L2] * e
+        s[W + i] += par[L3] * e
+        s[H + i] = inp[16 + i]
 
 
 @register_jitable
-def _gyro_float(
-    s: np.ndarray, par: np.ndarray, eta: np.ndarray, v: np.ndarray, h: np.ndarray, u: np.ndarray
+def _adapt_float(
+    s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: tuple[float, float, float], rates: tuple[float, float, float]
 ) -> None:
-    sf, cf, st, ct = math.sin(eta[0]), math.cos(eta[0]), math.sin(eta[1]), math.cos(eta[1])
-    sp, cp = math.sin(eta[2]), math.cos(eta[2])
-    ts = par[TS]
-    om = np.empty(3)
-    om[0] = (v[0] - v[2] * st) / ts
-    om[1] = (v[1] * cf + v[2] * sf * ct) / ts
-    om[2] = (-v[1] * sf + v[2] * cf * ct) / ts
-    # C [0, -w0, 0]
-    wr = np.empty(3)
-    wr[0] = -par[W0] * ct * sp
-    wr[1] = -par[W0] * (sf * st * sp + cf * cp)
-    wr[2] = -par[W0] * (cf * st * sp - sf * cp)
-    L = np.empty(3)
+    z0 = wrap_pi(inp[3] - s[READING]) - wrap_pi(s[READING] - s[READING_BEFORE])
+    z1 = wrap_pi(inp[4] - s[READING + 1]) - wrap_pi(s[READING + 1] - s[READING_BEFORE + 1])
+    z2 = wrap_pi(inp[5] - s[READING + 2]) - wrap_pi(s[READING + 2] - s[READING_BEFORE + 2])
+    response = inverse_float(angles, rates, (z0, z1, z2))
     for i in range(3):
-        L[i] = par[I0 + i] / s[G + i] * (om[i] + wr[i]) + h[i]
+        x = _washed_float(s, RESPONSE, i, response[i])
+        c = _washed_float(s, DRIVE, i, 0.5 * (s[APPLIED + i] + s[BEFORE + i]) * par[DRIVE_OF + i])
+        if abs(c) > 1e-4 and s[STEPS] >= LEARN_FROM:
+            p = min(s[P + i] + 1e-6, 0.1)
+            gain = p * c / (1e-7 + c * c * p)
+            s[G + i] = min(max(s[G + i] + gain * (x - c * s[G + i]), 0.6), 1.7)
+            s[P + i] = p - gain * c * p
+
+
+@register_jitable
+def _washed_float(s: np.ndarray, base: int, i: int, x: float) -> float:
+    s[base + 3 * i] += 0.2 * (x - s[base + 3 * i])
+    s[base + 3 * i + 1] += 0.2 * (s[base + 3 * i] - s[base + 3 * i + 1])
+    s[base + 3 * i + 2] += 0.03 * (s[base + 3 * i + 1] - s[base + 3 * i + 2])
+    return s[base + 3 * i + 1] - s[base + 3 * i + 2]
+
+
+@register_jitable
+def _place_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    alpha = _acceleration_float(s, par)
+    angles = (s[Y] + s[V] + 0.5 * alpha[0], s[Y + 1] + s[V + 1] + 0.5 * alpha[1], s[Y + 2] + s[V + 2] + 0.5 * alpha[2])
+    rates = (s[V] + alpha[0], s[V + 1] + alpha[1], s[V + 2] + alpha[2])
     for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        wj, wk = om[j] + wr[j], om[k] + wr[k]
-        u[i] = wj * L[k] - wk * L[j] - par[I0 + i] / s[G + i] * (om[j] * wr[k] - om[k] * wr[j])
+        e = wrap_pi(angles[i] - ref[NEXT + i])
+        out[i] = ref[ACCEL + i] - par[K1] * e - par[K2] * (rates[i] - ref[RATE_NEXT + i]) - s[W + i]
+    body, inertia = inverse_float(angles, rates, _triple(out, 0)), _inertia_float(s, par)
+    gyro = (0.0, 0.0, 0.0)
+    if par[GYRO] != 0.0:
+        ts = par[TS]
+        h = (s[H] - s[APPLIED] * ts, s[H + 1] - s[APPLIED + 1] * ts, s[H + 2] - s[APPLIED + 2] * ts)
+        gyro = gyro_float(inertia, ts, par[ORBIT], angles, rates, h)
+    saturated = 0.0
+    for i in range(3):
+        u = body[i] * inertia[i] + gyro[i]
+        out[i] = min(max(u, -par[LIMIT + i]), par[LIMIT + i])
+        s[COMMAND + i] = out[i]
+        if out[i] != u:
+            saturated = 1.0
+    out[3] += saturated
+
+
+# -- fixed form --------------------------------------------------------------------------------------------------------
+
+
+@register_jitable
+def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    """One tick, in integers."""
+    out[0], out[1], out[2], out[3], s[RESTARTED], s[ARITHMETIC] = 0, 0, 0, 0, 0, 0
+    fresh = inp[0] != 0
+    if s[STEPS] == 0 and not fresh:
+        out[3] = 32
+        return
+    angles, rates = _triple(s, Y), _triple(s, V)
+    if s[STEPS] > 0:
+        _propagate_fixed(s, par)
+    if fresh:
+        _correct_fixed(s, par, inp)
+    if par[ADAPT] != 0:
+        if fresh and inp[1] >= min(3, s[STEPS] + 1):
+            _adapt_fixed(s, par, inp, angles, rates)
+        else:
+            out[3] = 4
+    for i in range(3):
+        s[BEFORE + i] = s[APPLIED + i]
+        s[APPLIED + i] = sat32(shift_round(inp[13 + i], par[TORQUE_SHIFT])) if inp[2] != 0 else s[COMMAND + i]
+        if fresh:
+            s[READING_BEFORE + i], s[READING + i] = s[READING + i], inp[3 + i]
+    if s[STEPS] < START_STEPS:
+        last = s[STEPS] == START_STEPS - 1
+        for i in range(3):
+            rate = s[V + i] if last else 0
+            restart_fixed(ref, i, wrap32(s[Y + i] + shift_round(rate, 4)), rate)
+            s[COMMAND + i] = 0
+        s[RESTARTED] = 1
+        out[3] += 32
+    else:
+        _place_fixed(s, par, ref, out)
+    if s[ARITHMETIC] != 0:
+        out[3] += 8
+    s[STEPS] = min(s[STEPS] + 1, STEPS_MAX)
+
+
+@register_jitable
+def _drive_fixed(par: np.ndarray, i: int, torque: int) -> int:
+    """Acceleration, turn36, of a torque Q28 on the inertia I0."""
+    return sat32(mul_q(torque, par[DRIVE_OF + i], par[DRIVE_SHIFT + i]))
+
+
+@register_jitable
+def _scale_fixed(s: np.ndarray, par: np.ndarray) -> tuple[int, int, int]:
+    """Per axis, torque Q28 of the inertia I0 / g = acceleration (turn36) times this 2^-DEMAND_SHIFT."""
+    x, y = mul_q(par[TORQUE_OF], s[G_INV], 28), mul_q(par[TORQUE_OF + 1], s[G_INV + 1], 28)
+    return x, y, mul_q(par[TORQUE_OF + 2], s[G_INV + 2], 28)
+
+
+@register_jitable
+def _gyro_fixed(
+    s: np.ndarray, par: np.ndarray, angles: tuple[int, int, int], rates: tuple[int, int, int], h: tuple[int, int, int]
+) -> tuple[int, int, int]:
+    shift = _triple(par, DEMAND_SHIFT)
+    return gyro_fixed(_scale_fixed(s, par), shift, par[TS], par[TS_INV], par[ORBIT], angles, rates, h)
+
+
+@register_jitable
+def _acceleration_fixed(s: np.ndarray, par: np.ndarray) -> tuple[int, int, int]:
+    """alpha at (y^, v^) with the torque that acts now, turn36."""
+    angles, rates = _triple(s, Y), _triple(s, V)
+    gyro = (0, 0, 0)
+    if par[GYRO] != 0:
+        gyro = _gyro_fixed(s, par, angles, rates, _triple(s, H))
+    x = sat32(mul_q(_drive_fixed(par, 0, sub_sat(s[APPLIED], gyro[0])), s[G], 28))
+    y = sat32(mul_q(_drive_fixed(par, 1, sub_sat(s[APPLIED + 1], gyro[1])), s[G + 1], 28))
+    z = sat32(mul_q(_drive_fixed(par, 2, sub_sat(s[APPLIED + 2], gyro[2])), s[G + 2], 28))
+    a = forward_fixed(angles, rates, (x, y, z))
+    return add_sat(a[0], s[W]), add_sat(a[1], s[W + 1]), add_sat(a[2], s[W + 2])
+
+
+@register_jitable
+def _moved_fixed(y: int, v: int, alpha: int) -> int:
+    """y + v + alpha / 2: bam and turn36 to bam."""
+    return wrap32(y + shift_round(shift_round(v, -1) + alpha, 5))
+
+
+@register_jitable
+def _propagate_fixed(s: np.ndarray, par: np.ndarray) -> None:
+    alpha = _acceleration_fixed(s, par)
+    for i in range(3):
+        s[Y + i] = _moved_fixed(s[Y + i], s[V + i], alpha[i])
+        s[V + i] = keep32(s[V + i] + alpha[i], s, ARITHMETIC)
+        s[H + i] = keep32(s[H + i] - mul_q(s[APPLIED + i], par[TS], 30), s, ARITHMETIC)
+        s[INNOVATION + i] = 0
+
+
+@register_jitable
+def _correct_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
+    for i in range(3):
+        if s[STEPS] == 0:
+            s[Y + i], s[READING + i], s[READING_BEFORE + i] = inp[3 + i], inp[3 + i], inp[3 + i]
+        e = wrap32(inp[3 + i] - s[Y + i])
+        s[INNOVATION + i] = e
+        s[Y + i] = wrap32(s[Y + i] + mul_q(par[L1], e, 30))
+        s[V + i] = keep32(s[V + i] + mul_q(par[L2], e, 26), s, ARITHMETIC)
+        s[W + i] = keep32(s[W + i] + mul_q(par[L3], e, 26), s, ARITHMETIC)
+        s[H + i] = keep32(shift_round(inp[16 + i], par[MOMENTUM_SHIFT]), s, ARITHMETIC)
+
+
+@register_jitable
+def _second_difference_fixed(s: np.ndarray, inp: np.ndarray, i: int) -> int:
+    """z, turn36."""
+    z = wrap32(inp[3 + i] - s[READING + i]) - wrap32(s[READING + i] - s[READING_BEFORE + i])
+    return sat32(shift_round(z, -4))
+
+
+@register_jitable
+def _adapt_fixed(
+    s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: tuple[int, int, int], rates: tuple[int, int, int]
+) -> None:
+    z0, z1, z2 = (
+        _second_difference_fixed(s, inp, 0),
+        _second_difference_fixed(s, inp, 1),
+        _second_difference_fixed(s, inp, 2),
+    )
+    response = inverse_fixed(angles, rates, (z0, z1, z2))
+    for i in range(3):
+        drive = _drive_fixed(par, i, s[APPLIED + i]) + _drive_fixed(par, i, s[BEFORE + i])
+        x = _washed_fixed(s, RESPONSE, i, response[i])
+        c = _washed_fixed(s, DRIVE, i, shift_round(drive, 1))
+        if abs(c) > 3435974 and s[STEPS] >= LEARN_FROM:  # 1e-4 rad
+            _learn_fixed(s, i, x, c)
+
+
+@register_jitable
+def _washed_fixed(s: np.ndarray, base: int, i: int, x: int) -> int:
+    """Two lowpasses, minus a slow one: turn36 in, rad Q35 out. 0.2 and 0.03 in Q30."""
+    s[base + 3 * i] = sat32(s[base + 3 * i] + mul_q(x - s[base + 3 * i], 214748365, 30))
+    s[base + 3 * i + 1] = sat32(s[base + 3 * i + 1] + mul_q(s[base + 3 * i] - s[base + 3 * i + 1], 214748365, 30))
+    s[base + 3 * i + 2] = sat32(s[base + 3 * i + 2] + mul_q(s[base + 3 * i + 1] - s[base + 3 * i + 2], 32212255, 30))
+    return sat32(mul_q(sub_sat(s[base + 3 * i + 1], s[base + 3 * i + 2]), 843314857, 28))
+
+
+@register_jitable
+def _learn_fixed(s: np.ndarray, i: int, x: int, c: int) -> None:
+    """The scalar identification: x, c rad Q35; P Q34, P c Q44, denominator Q50, G Q20, g Q28."""
+    p = min(s[P + i] + 17180, 1717986918)
+    pc = mul_q(p, c, 25)
+    denominator = 112589991 + mul_q(shift_round(pc, 7), c, 22)  # Q37 times Q35
+    gain = sat32(div_trunc(shift_round(pc, -26), denominator))
+    error = sat32(x - mul_q(c, s[G + i], 28))
+    s[G + i] = clip(s[G + i] + mul_q(gain, error, 27), 161061274, 456340275)
+    s[G_INV + i] = div_trunc(1 << 56, s[G + i])
+    s[P + i] = clip(p - mul_q(sat32(mul_q(gain, c, 25)), p, 30), 0, 1717986918)
+
+
+@register_jitable
+def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    alpha = _acceleration_fixed(s, par)
+    angles = (
+        _moved_fixed(s[Y], s[V], alpha[0]),
+        _moved_fixed(s[Y + 1], s[V + 1], alpha[1]),
+        _moved_fixed(s[Y + 2], s[V + 2], alpha[2]),
+    )
+    rates = (add_sat(s[V], alpha[0]), add_sat(s[V + 1], alpha[1]), add_sat(s[V + 2], alpha[2]))
+    for i in range(3):
+        e = mul_q(par[K1], wrap32(angles[i] - ref[NEXT + i]), 26)
+        f = mul_q(par[K2], sub_sat(rates[i], ref[RATE_NEXT + i]), 30)
+        out[i] = keep32(ref[ACCEL + i] - e - f - s[W + i], s, ARITHMETIC)
+    body, scale = inverse_fixed(angles, rates, _triple(out, 0)), _scale_fixed(s, par)
+    gyro = (0, 0, 0)
+    if par[GYRO] != 0:
+        hx = sat32(s[H] - mul_q(s[APPLIED], par[TS], 30))
+        hy = sat32(s[H + 1] - mul_q(s[APPLIED + 1], par[TS], 30))
+        hz = sat32(s[H + 2] - mul_q(s[APPLIED + 2], par[TS], 30))
+        gyro = _gyro_fixed(s, par, angles, rates, (hx, hy, hz))
+    saturated = 0
+    for i in range(3):
+        u = keep32(mul_q(body[i], scale[i], par[DEMAND_SHIFT + i]) + gyro[i], s, ARITHMETIC)
+        s[COMMAND + i] = clip(u, -par[LIMIT + i], par[LIMIT + i])
+        if s[COMMAND + i] != u:
+            saturated = 1
+        out[i] = sat32(shift_round(s[COMMAND + i], -par[TORQUE_SHIFT]))
+    out[3] += saturated
+
+
+# -- the law as the board sees it ----------------------------------------------------------------------------------------
 
 
 @jit.compile
@@ -190,27 +401,60 @@ def _run_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     step_float(s, par, inp, ref, out)
 
 
+@jit.compile
+def _run_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    step_fixed(s, par, inp, ref, out)
+
+
 class Appc(CompiledLaw):
+    """The law `appc` in the form of the configuration."""
+
     STATE = STATE
+    functions = (step_float, step_fixed)
+    compiled = (_run_float, _run_fixed)
+
+    @property
+    def reference_restarted(self) -> bool:
+        return bool(self.state[RESTARTED])
+
+    def initialise(self, state: np.ndarray) -> None:
+        one, p = (1.0, 0.1) if self.is_float else (1 << 28, 1717986918)
+        state[G : G + 3] = state[G_INV : G_INV + 3] = one
+        state[P : P + 3] = p
 
     @staticmethod
-    def float_par(configuration: Configuration) -> Sequence[float]:
+    def float_par(configuration: Configuration) -> list[float]:
         v = configuration.values
-        pc, po = v["controller_pole"], v["observer_pole"]
-        # error poly of [y,v,w] current estimator with triple pole
-        l1 = 1 - po**3
-        l3 = (1 - po) ** 3
-        l2 = 1.5 * (1 - po) ** 2 * (1 + po)
-        return [
-            v["period_us"] * 1e-6, (1 - pc) ** 2, (1 - pc) * (3 + pc) / 2, l1, l2, l3,
-            *configuration.vector("torque_limit"), *configuration.vector("inertia_kgm2"),
-            v["adapt"], v["gyro"], v["orbit_rate_radps"],
-        ]
+        pc, po, ts = v["controller_pole"], v["observer_pole"], v["period_us"] * 1e-6
+        gains = [(1 - pc) ** 2, (1 - pc) * (3 + pc) / 2, 1 - po**3, 1.5 * (1 - po) ** 2 * (1 + po), (1 - po) ** 3]
+        inertia = configuration.vector("inertia_kgm2")
+        par = [ts, 1 / ts, *gains, v["adapt"], v["gyro"], v["orbit_rate_radps"] * ts, 0.0, 0.0]
+        par += [*configuration.vector("torque_limit"), *(i / ts**2 for i in inertia), *(ts**2 / i for i in inertia)]
+        return par + [0.0] * (PARAMETERS - len(par))
 
     @staticmethod
-    def float_step() -> Step:
-        return _run_float
+    def fixed_par(configuration: Configuration) -> list[int]:
+        common, p = configuration.common, configuration.params
+        period_us, one = common["period_us"], 1 << 30
+        ts, ts_inv = div_trunc(shift_round(period_us, -30), 1000000), div_trunc(1000000 << 28, period_us)
+        pc, qc, qo = p["controller_pole"], one - p["controller_pole"], one - p["observer_pole"]
+        qo2, po3 = mul_q(qo, qo, 30), mul_q(mul_q(p["observer_pole"], p["observer_pole"], 30), p["observer_pole"], 30)
+        l2 = mul_q(mul_q(qo2, one + p["observer_pole"], 30), 3, 1)
+        gains = [mul_q(qc, qc, 30), mul_q(qc, pc + 3 * one, 31), one - po3, l2, mul_q(qo2, qo, 30)]
+        orbit = mul_q(mul_q(p["orbit_rate_radps"], ts, 32), INV_TWO_PI_Q34, 34)
+        shifts = [common["torque_bits"] - 28, common["momentum_bits"] - 28]
+        drive = [drive_fixed(period_us, p[f"inertia_kgm2_{axis}"]) for axis in AXES]
+        demand = [demand_fixed(m, n) for m, n in drive]
+        par = [ts, ts_inv, *gains, p["adapt"], p["gyro"], orbit, *shifts, *torque_limits_fixed(common)]
+        par += [m for m, _ in demand] + [m for m, _ in drive] + [n for _, n in demand]
+        return par + [n for _, n in drive]
 
-    def initialise(self, state):
-        state[G : G + 3] = 1
-        state[P : P + 3] = 0.1
+    def telemetry(self) -> list[int]:
+        s = self.state.tolist()
+        fields = (G, P, INNOVATION, W)
+        if self.is_float:
+            lsb = (2.0**-28, 2.0**-34, 2 * math.pi / 2**32, 2 * math.pi / 2**36)
+            words = [word_of(s[f + i], unit) for f, unit in zip(fields, lsb, strict=True) for i in range(3)]
+        else:
+            words = [s[f + i] for f in fields for i in range(3)]
+        return limited(words, APPC.telemetry)

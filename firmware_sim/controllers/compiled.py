@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from protocol.law_tables import FORM_FLOAT, Configuration, Word, refusal
+from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, shift_round
+from protocol.law_tables import AXES, FORM_FLOAT, Configuration, Word, refusal
 
-INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
 
 
@@ -43,10 +44,13 @@ def size(fields: Sequence[Field]) -> int:
 class CompiledLaw:
     """Base of pd, mrac and appc: `state` and `par` are int64 (fixed) or float64 arrays, `step` runs one function.
 
-    A law gives STATE, RESTARTED (state index of "this step restarted the reference"), the four functions, telemetry().
+    A law gives STATE, `functions` and `compiled` (float step, fixed step, as source and compiled), the parameters,
+    telemetry().
     """
 
     STATE: ClassVar[tuple[Field, ...]]
+    functions: ClassVar[tuple[Step, Step]]
+    compiled: ClassVar[tuple[Step, Step]]
     has_model: ClassVar[bool] = True
 
     def __init__(self, configuration: Configuration) -> None:
@@ -59,7 +63,7 @@ class CompiledLaw:
         numbers: Sequence[float] = self.float_par(configuration) if self.is_float else self.fixed_par(configuration)
         self.par = np.array(numbers, dtype)
         self.state = np.zeros(size(self.STATE), dtype)
-        self._run = self.float_step() if self.is_float else self.fixed_step()
+        self._run = self.compiled[0] if self.is_float else self.compiled[1]
         self.initialise(self.state)
 
     @staticmethod
@@ -70,16 +74,6 @@ class CompiledLaw:
     @staticmethod
     def fixed_par(configuration: Configuration) -> Sequence[int]:
         """Parameters of the fixed form, derived from the words by named operations only."""
-        raise NotImplementedError
-
-    @staticmethod
-    def float_step() -> Step:
-        """The compiled float step."""
-        raise NotImplementedError
-
-    @staticmethod
-    def fixed_step() -> Step:
-        """The compiled fixed step."""
         raise NotImplementedError
 
     def initialise(self, state: np.ndarray) -> None:
@@ -114,7 +108,20 @@ def word_of(value: float, lsb: float) -> int:
 
 def limited(words: Sequence[int], table: Sequence[Word]) -> list[int]:
     """Telemetry words within the ranges of their table."""
-    return [
-        int(min(max(value, round(word.minimum * 2.0 ** int(word.q))), round(word.maximum * 2.0 ** int(word.q)), INT32_MAX))
-        for value, word in zip(words, table, strict=True)
-    ]
+    return [int(min(max(value, low), high)) for value, (low, high) in zip(words, _ranges(table), strict=True)]
+
+
+@cache
+def _ranges(table: tuple[Word, ...]) -> tuple[tuple[int, int], ...]:
+    scales = [2.0 ** int(word.q) for word in table]
+    return tuple(
+        (max(round(word.minimum * scale), INT32_MIN), min(round(word.maximum * scale), INT32_MAX))
+        for word, scale in zip(table, scales, strict=True)
+    )
+
+
+def torque_limits_fixed(common: Mapping[str, int]) -> list[int]:
+    """torque_limit x, y, z in Q28; at most 8 N m, and at most what 32 bits of the wire's LSB hold."""
+    wire = shift_round(INT32_MAX, max(common["torque_bits"] - 28, 0)) - 1
+    limits = [shift_round(common[f"torque_limit_{axis}"], common["torque_bits"] - 28) for axis in AXES]
+    return [clip(limit, 0, min(wire, INT32_MAX)) for limit in limits]
