@@ -7,13 +7,15 @@ import ctypes
 import os
 import signal
 import sys
+import traceback
 
 PR_SET_PDEATHSIG = 1
 EXIT_LINK = 3
+EXIT_LAW = 4
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Exit codes: 0 stopped by the laboratory or by a signal, 2 bad arguments or law, 3 link failure."""
+    """Exit codes: 0 stopped by the laboratory or by a signal, 2 bad arguments, 3 link failure, 4 the law raised."""
     options = _parser().parse_args(argv)
     if options.parent:
         _die_with(options.parent)
@@ -44,6 +46,10 @@ def main(argv: list[str] | None = None) -> int:
         return 0 if options.once else _fail(str(error), EXIT_LINK)
     except KeyboardInterrupt:
         return 0
+    except Exception as error:
+        # A law that raises ends the board, loudly: the traceback for its author, the last line for the laboratory.
+        traceback.print_exc()
+        return _fail(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}", EXIT_LAW)
     finally:
         port.close()
     return 0
@@ -52,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="firmware_sim",
-        description="The controller of the testbed in its own process: fixed-point law, own timer, nothing of the plant.",
+        description="The controller of the testbed in its own process: the law, its own timer, nothing of the plant.",
         epilog="examples: --link serial:///dev/pts/7   --link udp://127.0.0.1:5005   --link udp://0.0.0.0:5005",
     )
     parser.add_argument(
@@ -67,7 +73,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _die_with(parent: int) -> None:
-    """The kernel kills this process with its parent, whatever killed that one (Linux; elsewhere the link's end does)."""
+    """Die with the parent, whatever killed it: the kernel sees to it on Linux, elsewhere the end of the link."""
     try:
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     except (OSError, AttributeError):

@@ -134,6 +134,7 @@ class Board:
         sample: Sample = packet.frame
         if sample.tick < self._next_tick:
             flight.count_dropped(sample.tick)
+            self._phase_timer(flight, self._next_tick - sample.tick)
             return
         if sample.tick - self._next_tick > AHEAD_LIMIT:
             flight.restart(self._next_tick, sample.tick)
@@ -141,7 +142,7 @@ class Board:
         while self._next_tick < sample.tick:
             self._step(None)
         self._step(sample)
-        self._phase_timer(flight)
+        self._phase_timer(flight, 1)
 
     def _on_tick(self, packet: Packet) -> None:
         """TICK(k), sent in lockstep where no valid SAMPLE(k) survived the link: step up to and including k."""
@@ -162,10 +163,14 @@ class Board:
         self.timer_ns += self._wall_ns(flight.period_ns)
         self._step(None)
 
-    def _phase_timer(self, flight: Flight) -> None:
-        """Each good SAMPLE re-phases the timer, so clock drift accumulates only in gaps."""
+    def _phase_timer(self, flight: Flight, ticks: int) -> None:
+        """The SAMPLE of `_next_tick` is expected `ticks` periods from now.
+
+        Each SAMPLE re-phases the timer, so clock drift accumulates only in gaps. A stale one does too: a laboratory
+        that stood still (ticks are never skipped) finds the board ahead, and the board then waits for it.
+        """
         if self._clock_rate_q16:
-            self.timer_ns = self._hal.now() + self._wall_ns(flight.period_ns + flight.sample_timeout_ns)
+            self.timer_ns = self._hal.now() + self._wall_ns(ticks * flight.period_ns + flight.sample_timeout_ns)
 
     def _wall_ns(self, simulated_ns: int) -> int:
         return simulated_ns * 65536 // self._clock_rate_q16

@@ -25,7 +25,7 @@ class FlightRefused(Exception):
 
 
 class Flight:
-    """The configured board. `words` are the CONFIG words; raises ConfigError (with the word's index) or FlightRefused."""
+    """The configured board. `words`: CONFIG. Raises ConfigError (with the bad word's index) or FlightRefused."""
 
     def __init__(self, words: Sequence[int], user_law: tuple[LawTable, type] | None = None) -> None:
         configuration = parse_configuration(words, user_law[0] if user_law else None)
@@ -59,7 +59,7 @@ class Flight:
         return controllers.new_law(self._table.name, configuration)
 
     def _warm_up(self) -> None:
-        """Compile and allocate on a copy, so that the next SAMPLE is answered in time and the flight state is untouched."""
+        """Compile and allocate on a copy: the next SAMPLE is answered in time, and the flight state is untouched."""
         self._begin(0)
         quaternion = Reading(0, (2**30, 0, 0, 0))
         zero = (0, 0, 0)
@@ -155,7 +155,7 @@ class Flight:
             self._row += 1
 
     def _fill(self, tick: int, sample: Sample | None) -> None:
-        """The law's inputs in wire units; what acts now is the lab's word, or without it the board's own last command."""
+        """The law's inputs in wire units; what acts now is the lab's word, without it the board's own last command."""
         wire = self._wire
         wire[inputs.FRESH] = sample is not None
         wire[inputs.GOOD_RUN] = self._good_run

@@ -1,4 +1,4 @@
-"""What the board needs of its hardware: a clock, a way to wait for a frame, a watchdog. Same names as firmware/core/hal.h.
+"""What the board needs of its hardware: a clock, a wait for frames, a watchdog. Same names as firmware/core/hal.h.
 
 The board never asks which hal it has. `HostHal` is a workstation; a test hands in a hal whose clock it sets.
 """

@@ -22,6 +22,8 @@ from sil.trouble import LinkFailure
 ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
 LOOK_EVERY_S = 0.25
 REMEMBERED_TICKS = 256
+EARLY_LIMIT = 1024  # frames; a laboratory that stood still for longer has lost the rest
+ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
 
 
 class Answers:
@@ -46,6 +48,8 @@ class Answers:
         self._complete = -1  # newest tick whose whole answer is here
         self._followers = 0  # frames still to come of the answer under way
         self._done_ns: dict[int, int] = {}
+        self._should_use: set[int] = set()  # ticks whose SAMPLE the board has in time, by the model
+        self._early: list[Packet] = []  # answers to ticks that are still to come: the board's own timer was faster
         self._sent_wall_ns = 0
         self._heard_wall_ns = time.monotonic_ns()
         self.answer_ns: list[int] = []
@@ -70,7 +74,21 @@ class Answers:
             self._port.send(Tick(tick))
         self._recorder.packet(tick, Direction.UP, Outcome.DELIVERED if fate.delivered else Outcome.DROPPED, packet)
         self._done_ns[tick] = self._model.done_ns(tick, transit_us * 1000 if fate.delivered else None)
+        if fate.delivered and not self._model.overrun and sample.valid == self._valid_mask(sample):
+            self._should_use.add(tick)
         self._done_ns.pop(tick - REMEMBERED_TICKS, None)
+        self._should_use.discard(tick - REMEMBERED_TICKS)
+        if self._early:
+            self._take_early()
+
+    @staticmethod
+    def _valid_mask(sample: Sample) -> int:
+        return sum(1 << bit for bit, reading in enumerate(sample.readings) if reading is not None)
+
+    def _take_early(self) -> None:
+        early, self._early = self._early, []
+        for packet in early:
+            self._take(packet)
 
     # -- down ----------------------------------------------------------------------------------------------------
 
@@ -112,7 +130,12 @@ class Answers:
     def _take(self, packet: Packet) -> None:
         self._heard_wall_ns = time.monotonic_ns()
         kind = packet.type
-        if kind == Type.COMMAND:
+        if kind in ANSWERS and packet.tick > self._tick:
+            if len(self._early) < EARLY_LIMIT:
+                self._early.append(packet)
+            else:
+                self.duplicates += 1
+        elif kind == Type.COMMAND:
             self._command(packet)
         elif kind in (Type.TELEMETRY, Type.EVENT):
             self._follower(packet)
@@ -128,6 +151,8 @@ class Answers:
             self.duplicates += 1
             return
         self._complete, self._followers = tick, command.follows
+        if command.used in (frames.PROPAGATED, frames.REPEATED) and tick in self._should_use:
+            self._window.board_was_faster(tick)
         if tick == self._tick:
             self.answer_ns.append(self._heard_wall_ns - self._sent_wall_ns)
         x, y, z = command.torque

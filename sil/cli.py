@@ -1,4 +1,4 @@
-"""The command line: `sil run`, `plant`, `board`, `replay`, `diff`, `info`, `plot`, `export`, `check`, `scenarios`, `recover`.
+"""The command line: sil run, plant, board, replay, diff, info, plot, export, check, scenarios, recover.
 
 Data goes to stdout, one-line errors to stderr. Exit codes, the first that applies: 130 interrupted; 2 usage or invalid
 scenario; 3 link or board failure, or timing degraded; 1 a requirement failed or a replay or diff differed; 0 passed.
@@ -29,7 +29,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Attitude-control testbed: a simulated satellite, a real link, a separate controller, one scenario file.\n\n"
-    "Start with [bold]sil run mrac-rs232[/], then [bold]sil plot[/] and [bold]sil replay[/] on the run directory it names.",
+    "Start with [bold]sil run mrac-rs232[/], then [bold]sil plot[/] and [bold]sil replay[/] on the run it names.",
     epilog="Exit codes: 0 passed, 1 a requirement failed or something differed, 2 usage or invalid scenario, "
     "3 link or board failure or degraded timing, 130 interrupted.",
 )

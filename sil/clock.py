@@ -11,7 +11,9 @@ import time
 from collections.abc import Callable
 from typing import Protocol
 
-POLL_MARGIN_NS = 2_000_000  # poll() has millisecond grain: the last stretch is slept to the absolute deadline
+# Waiting for frames ends a little before the deadline, and the last stretch is slept: poll() has a grain of 1 ms, and
+# the link uses select(), which has none, for waits below COARSE_NS only.
+COARSE_NS, COARSE_MARGIN_NS, MARGIN_NS = 20_000_000, 2_000_000, 200_000
 PR_SET_TIMERSLACK = 29
 
 
@@ -25,7 +27,7 @@ class Clock(Protocol):
         """Tick 0 (simulated time `first_tick_ns`) is now."""
 
     def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
-        """Sleep until simulated time `t_ns`, calling `listen(timeout_s)` for frames meanwhile; returns lateness in ns."""
+        """Sleep until simulated time `t_ns`, with `listen(timeout_s)` for frames meanwhile; returns lateness in ns."""
 
     def rebase(self, t_ns: int) -> None:
         """Simulated time `t_ns` is now: what was missed stays missed."""
@@ -64,8 +66,9 @@ class Scaled:
     def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
         deadline = self._epoch_ns + int(t_ns / self.scale)
         while (left := deadline - self._now()) > 0:
-            if left > 2 * POLL_MARGIN_NS:
-                listen((left - POLL_MARGIN_NS) * 1e-9)
+            margin = COARSE_MARGIN_NS if left >= COARSE_NS else MARGIN_NS
+            if left > margin:
+                listen((left - margin) * 1e-9)
             else:
                 time.sleep(left * 1e-9)
         return self._now() - deadline

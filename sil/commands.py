@@ -15,7 +15,7 @@ Torque = tuple[float, float, float]
 
 
 class Acting(NamedTuple):
-    """What acts from a tick on: commanded torque on the body (N m, before the wheels' limits), source, tick computed at."""
+    """What acts from a tick on: commanded torque on the body (before limits), its source, the tick of its command."""
 
     torque_Nm: Torque
     source: int
@@ -38,7 +38,7 @@ class Decides(Protocol):
 class ExecutionModel:
     """When the board would have finished the answer to a tick, in simulated ns; the board runs the same recursion.
 
-    start_k = max(arrival_k, free_at), free_at = start_k + answer_delay; without a SAMPLE arrival_k = t_k + sample_timeout.
+    start = max(arrival, free_at), free_at = start + answer_delay; arrival = t_k + sample_timeout without a SAMPLE.
     """
 
     def __init__(self, period_ns: int, sample_timeout_ns: int, answer_delay_ns: int) -> None:
@@ -46,10 +46,12 @@ class ExecutionModel:
         self._sample_timeout_ns = sample_timeout_ns
         self._answer_delay_ns = answer_delay_ns
         self._free_at_ns = 0
+        self.overrun = False  # the last SAMPLE found the board busy
 
     def done_ns(self, tick: int, transit_ns: int | None) -> int:
         """Call once per tick, in order. `transit_ns` of the SAMPLE, None where none reached the board."""
         arrival = tick * self._period_ns + (self._sample_timeout_ns if transit_ns is None else transit_ns)
+        self.overrun = transit_ns is not None and arrival < self._free_at_ns
         self._free_at_ns = max(arrival, self._free_at_ns) + self._answer_delay_ns
         return self._free_at_ns
 
@@ -101,6 +103,11 @@ class CommandWindow:
         """The run ended, and COMMAND(tick), due after its end, is not here: the clock's fault, or it would be."""
         if tick not in self._arrived and tick not in self._explained:
             self._unexplained.add(tick)
+
+    def board_was_faster(self, tick: int) -> None:
+        """The board's own timer stepped `tick`, though by the model its SAMPLE was there in time: the clock's fault."""
+        self._real_misses += 1
+        self.notices.append((events.REAL_MISS, tick, 1))
 
     def lost(self, tick: int) -> None:
         """The link dropped COMMAND(tick): a miss of the scenario's own making."""

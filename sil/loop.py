@@ -156,7 +156,7 @@ class Loop:
 
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:
-    """(3,) SI values to wire integers, rounded half to even, clipped to int32 (a diverging run must not stop the wire)."""
+    """(3,) SI values to wire integers, half to even, clipped to int32: a diverging run must not stop the wire."""
     scaled = np.rint(values / unit).clip(-(2**31) + 1, 2**31 - 1)
     x, y, z = scaled.astype(np.int64).tolist()
     return x, y, z

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
 from mcap.data_stream import ReadDataStream
+from mcap.exceptions import EndOfFile
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Chunk, Header, Metadata
 
@@ -60,31 +61,38 @@ class _Scan:
     def __init__(self, path: Path, topics: frozenset[str]) -> None:
         self._data = path.read_bytes()
         self._topics = topics
+        self._library = ""
         self._wanted: dict[int, list[Message]] = {}
         self._content = Content("", {topic: [] for topic in topics}, {}, {}, {})
 
     def all(self) -> Content:
+        """Check what covers the whole file first, so that damage is told as such; then take the content."""
         self._check_ends()
-        library = ""
-        footer_at = 0
-        for opcode, start, end in self._records():
-            if opcode == Opcode.HEADER:
-                library = Header.read(self._stream(start, end)).library
-            elif opcode == Opcode.CHUNK:
-                self._chunk(start, end)
-            elif opcode == Opcode.METADATA:
-                record = Metadata.read(self._stream(start, end))
-                self._content.metadata[record.name] = record.metadata
-            elif opcode == Opcode.ATTACHMENT:
-                self._attachment(start, end)
-            elif opcode == Opcode.DATA_END:
-                self._check_data(start)
-            elif opcode == Opcode.FOOTER:
-                footer_at = start
-        if not footer_at:
-            raise McapError("has no footer: it was cut off while it was written")
-        self._check_summary(footer_at)
-        return self._content._replace(library=library)
+        records = list(self._records())
+        starts = {opcode: start for opcode, start, _ in records if opcode in (Opcode.DATA_END, Opcode.FOOTER)}
+        if len(starts) != 2:
+            raise McapError("is corrupt or cut off: it has no end of data or no footer")
+        self._check_data(starts[Opcode.DATA_END])
+        self._check_summary(starts[Opcode.FOOTER])
+        try:
+            for opcode, start, end in records:
+                self._take(opcode, start, end)
+        except (struct.error, UnicodeDecodeError, EndOfFile, ValueError) as error:
+            raise McapError(f"is corrupt: {error!r}") from error
+        return self._content._replace(library=self._library)
+
+    def _take(self, opcode: int, start: int, end: int) -> None:
+        if opcode == Opcode.HEADER:
+            self._library = Header.read(self._stream(start, end)).library
+        elif opcode == Opcode.CHUNK:
+            self._chunk(start, end)
+        elif opcode == Opcode.METADATA:
+            record = Metadata.read(self._stream(start, end))
+            self._content.metadata[record.name] = record.metadata
+        elif opcode == Opcode.ATTACHMENT:
+            self._attachment(start, end)
+        elif opcode == Opcode.CHANNEL:  # repeated in the summary: all of them, even those without messages
+            self._channel(Channel.read(self._stream(start, end)))
 
     def _check_ends(self) -> None:
         if not self._data:
@@ -118,6 +126,8 @@ class _Scan:
             raise McapError(f"is corrupt: bytes 0 to {end} do not give the CRC {stored:08x} of the data section")
 
     def _check_summary(self, start: int) -> None:
+        if start + 20 > len(self._data):
+            raise McapError("is corrupt: its footer is cut off")
         summary_start, _, stored = struct.unpack_from("<QQI", self._data, start)
         begin = summary_start or start - _HEAD.size
         if stored and zlib.crc32(memoryview(self._data)[begin : start + 16]) != stored:

@@ -1,4 +1,4 @@
-"""Scenario to rig: who is plugged into whom. Builds plant, sensors, wheels, link, board and loop, and takes them down."""
+"""Scenario to rig: who is plugged into whom. Builds plant, sensors, wheels, link, board, loop, and takes them down."""
 
 from __future__ import annotations
 

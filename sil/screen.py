@@ -87,7 +87,7 @@ def show_summary(summary: Mapping[str, Any]) -> None:
     timing = summary["timing"]
     console.print(
         f"[bold {colour}]{summary['verdict']}[/]  {summary['scenario']}: {summary['ticks']} ticks, "
-        f"{summary['duration_s']:g} s simulated in {timing['wall_s']:.2f} s ({timing['times_real_time']:,.0f} x real time)"
+        f"{summary['duration_s']:g} s in {timing['wall_s']:.2f} s ({timing['times_real_time']:,.0f} x real time)"
     )
     if summary["failure"]:
         console.print(f"[red]{summary['failure']}[/]")

@@ -19,7 +19,7 @@ BOARDS = {
 
 @dataclass(frozen=True)
 class BoardOrder:
-    """What a run asks of a board. `law_file`: `/abs/file.py:Class` of a user's law, or "". `log`: its stderr goes there."""
+    """What a run asks of a board. `law_file`: `/abs/file.py:Class` of a user's law, or "". `log`: for its stderr."""
 
     link_url: str
     law_file: str

@@ -1,4 +1,4 @@
-"""The board inside the laboratory's process, through frames all the same. The one file of `sil` that imports firmware_sim."""
+"""The board inside the laboratory's process, through frames all the same; the one file that imports firmware_sim."""
 
 from __future__ import annotations
 

@@ -1,0 +1,184 @@
+"""Every verb of the command line, as a subprocess: data on stdout, one line of error on stderr, the right exit code."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import pytest
+
+COLUMNS = (
+    "tick,t_s,phi_deg,theta_deg,psi_deg,ref_phi_deg,ref_theta_deg,ref_psi_deg,"
+    "command_x_Nm,command_y_Nm,command_z_Nm,applied_x_Nm,applied_y_Nm,applied_z_Nm,"
+    "w_x_radps,w_y_radps,w_z_radps,h_x_Nms,h_y_Nms,h_z_Nms,q_s,q_x,q_y,q_z"
+).split(",")
+VERBS = ("run", "plant", "board", "replay", "diff", "info", "plot", "export", "check", "scenarios", "recover")
+SHORT = ("appc-rs232", "--set", "duration_s=30", "--set", "require=[]")
+
+
+def test_run_prints_the_verdict_and_leaves_a_run_directory(cli):
+    out, err = cli("run", *SHORT, "--clock", "lockstep", "--out", "here")
+    assert "passed" in out
+    names = {path.name for path in (cli.folder / "here").iterdir()}
+    assert {"run.mcap", "timing.mcap", "run.journal", "summary.json"} <= names
+
+
+def test_json_is_one_object_with_the_published_keys(cli):
+    summary = cli.json("run", *SHORT, "--clock", "lockstep")
+    assert summary["verdict"] == "passed"
+    assert summary["exit_code"] == 0
+    assert summary["ticks"] == 60
+    for name in ("rms_error_deg", "rms_setpoint_error_deg", "peak_error_deg", "peak_torque_Nm", "rms_torque_Nm"):
+        assert len(summary["metrics"][name]) == 3
+    assert {"missed", "late", "overruns", "crc_errors", "discarded_bytes"} <= set(summary["link"])
+    assert {"wall_s", "seal_s", "times_real_time"} <= set(summary["timing"])
+    for name in ("wakeup_us", "answer_us"):
+        assert {"p50", "p99", "p99_9", "max"} == set(summary["timing"][name])
+    assert summary["reproducible"] is True
+    assert (cli.folder / summary["run_dir"] / "run.mcap").exists()
+    assert json.loads((cli.folder / summary["run_dir"] / "summary.json").read_text()) == summary
+
+
+def test_run_directories_are_numbered(cli):
+    first, second = (cli.json("run", *SHORT, "--clock", "lockstep")["run_dir"] for _ in range(2))
+    assert (first, second) == ("runs/appc-rs232-001", "runs/appc-rs232-002")
+
+
+def test_plant_and_board_by_hand_over_udp(cli):
+    board = cli.start("board", "--link", "udp://127.0.0.1:0", "--once")
+    try:
+        url = board.stdout.readline().split()[1]
+        summary = cli.json("plant", *SHORT, "--link", url, "--clock", "lockstep")
+        assert summary["ticks"] == 60
+        assert board.wait(10) == 0
+    finally:
+        board.kill()
+        board.communicate()
+
+
+def test_plant_and_board_by_hand_over_a_pty(cli):
+    plant = cli.start("plant", *SHORT, "--clock", "lockstep", "--json")
+    line = plant.stderr.readline()
+    url = line.split("--link ")[1].strip().rstrip(")")
+    board = cli.start("board", "--link", url, "--once")
+    try:
+        out, _ = plant.communicate(timeout=120)
+        assert json.loads(out)["ticks"] == 60
+        assert board.wait(10) == 0
+    finally:
+        board.kill()
+        board.communicate()
+
+
+def test_replay_identical(cli, recorded):
+    out, _ = cli("replay", str(recorded(*SHORT)))
+    assert out.startswith("identical: 60 ticks")
+
+
+def test_replay_in_a_board_process(cli, recorded):
+    assert cli.json("replay", str(recorded(*SHORT)), "--board", "process")["identical"]
+
+
+def test_replay_with_another_parameter_differs_and_says_where(cli, recorded):
+    out, _ = cli("replay", str(recorded(*SHORT)), "--set", "law.params.controller_pole=0.6", code=1)
+    assert "CONFIG differs: controller_pole" in out
+    assert "differs at tick" in out
+    assert "COMMAND tick=" in out
+
+
+def test_diff(cli, recorded):
+    same = recorded(*SHORT)
+    other = recorded(*SHORT, "--set", "seed=5", "--set", "sensors.attitude.noise_deg=0.02")
+    cli("diff", str(same), str(same))
+    out, _ = cli("diff", str(same), str(other), code=1)
+    assert out.strip()
+
+
+def test_info(cli, recorded):
+    out, _ = cli("info", str(recorded(*SHORT)))
+    assert "appc-rs232" in out
+    assert cli.json("info", str(recorded(*SHORT)))
+
+
+@pytest.mark.parametrize("name", ["it.png", "it.pdf"])
+def test_plot(cli, recorded, name):
+    cli("plot", str(recorded(*SHORT)), "--out", name)
+    head = (cli.folder / name).read_bytes()[:4]
+    assert head == (b"\x89PNG" if name.endswith("png") else b"%PDF")
+
+
+def test_export_has_the_published_columns(cli, recorded):
+    cli("export", str(recorded(*SHORT)), "out.csv")
+    rows = list(csv.reader(io.StringIO((cli.folder / "out.csv").read_text())))
+    assert rows[0] == COLUMNS
+    assert len(rows) == 61
+    assert [float(rows[1][i]) for i in (0, 1, 2, 3, 4)] == pytest.approx([0, 0, 10, 10, 5])
+
+
+def test_check_and_scenarios(cli):
+    names = [entry["name"] for entry in cli.json("scenarios")]
+    assert "mrac-rs232" in names
+    for name in names:
+        cli("check", name)
+
+
+def test_recover(cli, recorded):
+    run = recorded(*SHORT)
+    before = (run / "run.mcap").read_bytes()
+    (run / "run.mcap").unlink()
+    out, _ = cli("recover", str(run))
+    assert "60 ticks" in out
+    assert (run / "run.mcap").read_bytes() == before
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(cli, verb):
+    out, _ = cli(verb, "--help")
+    assert "Usage" in out
+
+
+# -- bad input: one line, the exit code of DESIGN's table, nothing lost ------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (("run", "no-such-scenario"), 2, "known"),
+        (("run", "appc-rs232", "--clock", "fast"), 2, "lockstep, realtime or scaled:N"),
+        (("run", "appc-rs232", "--set", "law.name=lqr"), 2, "appc"),
+        (("run", "appc-rs232", "--set", "period_s=2.0"), 2, "0.2 to 1"),
+        (("run", "appc-rs232", "--out", "/proc/no"), 2, "/proc/no"),
+        (("run", "appc-rs232", "--board", "serial:///dev/not-there"), 3, "/dev/not-there"),
+        (("board", "--link", "carrier-pigeon"), 3, "carrier-pigeon"),
+        (("replay", "nowhere"), 2, "nowhere"),
+        (("info", "/etc/hostname"), 2, "/etc/hostname"),
+        (("recover", "nowhere"), 2, "nowhere"),
+        (("diff", "nowhere", "nowhere"), 2, "nowhere"),
+        (("frobnicate",), 2, "frobnicate"),
+    ],
+)
+def test_bad_input_is_one_clear_line(cli, arguments, code, says):
+    out, err = cli(*arguments, code=code)
+    assert says in err
+    assert "Traceback" not in err
+    assert out == ""
+
+
+def test_an_out_directory_that_is_not_empty_is_refused(cli):
+    (cli.folder / "mine").mkdir()
+    (cli.folder / "mine" / "thesis.txt").write_text("years of work")
+    _, err = cli("run", *SHORT, "--out", "mine", code=2)
+    assert "not empty" in err
+    assert [path.name for path in (cli.folder / "mine").iterdir()] == ["thesis.txt"]
+
+
+def test_a_busy_udp_port(cli):
+    import socket
+
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        _, err = cli("run", *SHORT, "--link", f"udp://127.0.0.1:{port}", code=3)
+    assert str(port) in err
+    assert "Traceback" not in err
