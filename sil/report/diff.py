@@ -54,13 +54,12 @@ class Difference(NamedTuple):
     identity: list[tuple[str, Any, Any]]  # (key, in a, in b)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
+        """Plain JSON values: what is not a number is null."""
+        truth = self.truth._asdict() if self.truth else {}
         return {
             **self._asdict(),
             "packet": self.packet._asdict() if self.packet else None,
-            "truth": {k: v if np.isfinite(v) else None for k, v in self.truth._asdict().items()}
-            if self.truth
-            else None,
+            "truth": {key: value if np.isfinite(value) else None for key, value in truth.items()} or None,
             "identity": [{"key": key, "a": a, "b": b} for key, a, b in self.identity],
         }
 

@@ -69,7 +69,7 @@ def _schema(about: str, fields: Sequence[Field]) -> str:
 
 
 TRUTH = Layout(
-    "sil/Truth",
+    "sil/msg/Truth",
     "The plant at the tick and the torque that acts from this tick on. Frames: N inertial, B body, v_N = q v_B q*.",
     [
         Field("float64", "q_bn", 4, "attitude of the body in inertial space, scalar first"),
@@ -85,7 +85,7 @@ TRUTH = Layout(
 )
 
 SAMPLE = Layout(
-    "sil/Sample",
+    "sil/msg/Sample",
     "A decoded SAMPLE frame. A reading that was not sent is NaN with age 0xffffffff.",
     [
         Field("float64", "setpoint_deg", 3, "set-point, deg"),
@@ -106,7 +106,7 @@ SAMPLE = Layout(
 )
 
 COMMAND = Layout(
-    "sil/Command",
+    "sil/msg/Command",
     "A decoded COMMAND frame.",
     [
         Field("float64", "torque_nm", 3, "commanded torque on the body, body axes, N m"),
@@ -120,7 +120,7 @@ COMMAND = Layout(
 )
 
 EVENT = Layout(
-    "sil/Event",
+    "sil/msg/Event",
     "Something worth knowing; /log has it in words.",
     [
         Field("uint32", "tick", 1, "tick number"),
@@ -132,7 +132,7 @@ EVENT = Layout(
 )
 
 SESSION = Layout(
-    "sil/Session",
+    "sil/msg/Session",
     "A board session started at this tick: a replay starts a fresh board here.",
     [
         Field("uint32", "tick", 1, "tick number"),
@@ -141,7 +141,7 @@ SESSION = Layout(
 )
 
 TIMING = Layout(
-    "sil/Timing",
+    "sil/msg/Timing",
     "Wall-clock behaviour of one tick on this machine.",
     [
         Field("int64", "lateness_ns", 1, "wake-up after the deadline, ns"),
@@ -155,7 +155,7 @@ TIMING = Layout(
 class PacketLayout:
     """A packet with its fate; of variable size, so it is read one by one."""
 
-    name = "sil/Packet"
+    name = "sil/msg/Packet"
     schema = (
         b"# A deterministic frame as it stood on the link, header to CRC, before COBS.\n"
         b"uint32 tick  # tick in the header, 0xffffffff for frames that belong to no tick\n"
@@ -193,7 +193,7 @@ PACKET = PacketLayout()
 class HousekeepingLayout:
     """A housekeeping packet with the host's time; of variable size."""
 
-    name = "sil/Housekeeping"
+    name = "sil/msg/Housekeeping"
     schema = (
         b"# A housekeeping frame, header to CRC, before COBS.\n"
         b"int64 host_ns  # CLOCK_MONOTONIC of the laboratory, ns\n"
@@ -224,7 +224,8 @@ def telemetry(law: str, words: Sequence[tuple[str, str]]) -> Layout:
         Field("uint16", "law_version", 1, "its version"),
         Field("uint8", "fate", 1, "0 delivered, 1 late, 2 dropped, 3 corrupted, 4 in flight"),
     ]
-    return Layout(f"sil/Telemetry_{_ros_name(law)}", f"A decoded TELEMETRY frame of law {law}.", fields + tail)
+    camel = "".join(part.capitalize() for part in _ros_name(law).split("_"))
+    return Layout(f"sil/msg/Telemetry{camel}", f"A decoded TELEMETRY frame of law {law}.", fields + tail)
 
 
 def _ros_name(name: str) -> str:
