@@ -29,7 +29,7 @@ def run(scenario: str | os.PathLike[str], *, out: str | os.PathLike[str] | None 
     import os
     from pathlib import Path
 
-    from sil.run import run_scenario
+    from sil.runner import run_scenario
     from sil.runs import open_run as read
     from sil.scenario import load_scenario
 

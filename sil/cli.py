@@ -17,7 +17,7 @@ import typer
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, EXIT_USAGE, SilError
 
 if TYPE_CHECKING:
-    from sil.run import Watch
+    from sil.runner import Watch
     from sil.runs import Run
     from sil.scenario import Scenario
 
@@ -313,7 +313,7 @@ _KEYS = {"clock": "clock", "link": "link.url", "board": "board"}
 
 
 def _run(scenario: Scenario, out: Path | None, as_json: bool, wired: bool) -> int:
-    from sil.run import run_scenario
+    from sil.runner import run_scenario
     from sil.screen import Silent, Terminal, show_summary
 
     watch: Watch = Silent() if as_json else Terminal(scenario.name)

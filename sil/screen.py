@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sil.run import Watch
+from sil.runner import Watch
 from sil.signals import Motion
 
 QUIET_S = 1.0  # nothing is drawn for a run that is over sooner

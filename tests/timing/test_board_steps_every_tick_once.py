@@ -35,9 +35,10 @@ def test_the_answer_is_command_then_telemetry_then_events_and_command_counts_the
 
 def test_tick_steps_without_a_sample_and_is_answered(bench):
     board = bench()
-    board.sample(0)
-    answer = board.tick(1)
-    assert used(answer) == [(1, frames.PROPAGATED)]
+    for tick in range(6):
+        board.sample(tick)
+    answer = board.tick(6)
+    assert used(answer) == [(6, frames.PROPAGATED)]
     assert [e.code for e in events_of(answer)] == [events.SAMPLE_LOST]
 
 
@@ -67,9 +68,10 @@ def test_a_law_with_a_model_propagates_and_does_not_reuse_the_stale_reading(benc
 
 def test_an_invalid_reading_counts_as_lost(bench):
     board = bench()
-    board.sample(0)
-    answer = board.sample(1, valid=6)  # Euler angles invalid
-    assert used(answer) == [(1, frames.PROPAGATED)]
+    for tick in range(6):
+        board.sample(tick)
+    answer = board.sample(6, valid=6)  # Euler angles invalid
+    assert used(answer) == [(6, frames.PROPAGATED)]
     assert [e.code for e in events_of(answer)] == [events.READING_INVALID, events.SAMPLE_LOST]
 
 
@@ -158,6 +160,18 @@ def test_the_timer_runs_at_the_clock_rate_of_hello(bench):
     board = bench(clock_rate_q16=20 * 65536, period_us=500_000, sample_timeout_us=100_000)
     board.sample(0)
     assert board.board.timer_ns == 600_000_000 // 20
+
+
+def test_a_stale_sample_rephases_the_timer_so_that_a_board_ahead_waits_for_the_lab(bench):
+    """The lab stood still for three periods and goes on where it was; the board must not stay ahead for ever."""
+    board = bench(clock_rate_q16=65536, period_us=500_000, sample_timeout_us=100_000)
+    board.sample(0)
+    for _ in range(3):
+        board.timer()
+    assert board.sample(1) == []
+    assert board.board.timer_ns == board.hal.time_ns + 3 * 500_000_000 + 100_000_000
+    assert board.sample(2) == board.sample(3) == []
+    assert used(board.sample(4)) == [(4, frames.USED)]
 
 
 def test_an_overrun_is_counted_and_propagated_over(bench):
