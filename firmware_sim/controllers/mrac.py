@@ -1,18 +1,45 @@
-"""mrac"""
+"""mrac: the unified law of Landau and Lozano with recursive least squares, per axis, as printed (d = 1) or repaired (d = 2).
+
+Model y(k) = phi theta, theta = [a1 a2 b0 b1 d]; v(k): input that acts from t_k on; C2 = 1 + c1 q^-1 + c2 q^-2 =
+(1 - c2_pole q^-1)^2; ym: reference with lead d. Measured y are unwrapped, ym is taken next to y. At tick k:
+
+    identify    phi = [-y(k-1) -y(k-2) v(k-1) v(k-2) 1];  e = y(k) - phi theta;  G = F phi / (l + phi' F phi)
+                theta += G e;  F = (F - G phi' F) / l;  l = forgetting, but 1 while trace F >= trace_max;  b0 is limited
+    printed     u = [C2 ym(k+1) - t0 y(k) - t1 y(k-1) - b1 u(k-1) - d] / b0,  t0 = c1 - a1,  t1 = c2 - a2
+                and phi has u(k-1), u(k-2), the law's own commands: it takes them for what acted
+    repaired    u = [C2 ym(k+2) - t0 y(k) - t1 y(k-1) - (b1c + b0c s1) v(k) - b1c s1 v(k-1) - (1 + s1) d] / b0c
+                s1 = c1 - a1,  t0 = c2 - a2 - a1 s1,  t1 = -a2 s1,  b0c = (b0 + b1)/(1 + kappa),  b1c = kappa b0c
+                v(k) = u(k-1), or what the laboratory reports as applied; the zero at -1 is not cancelled, but -kappa
+    decouple    u is taken for I0 times an Euler acceleration; command = I0 INV(eta, rate, u / I0), eta = (ym(k+1) +
+                ym(k+2))/2, rate = ym(k+2) - ym(k+1); all three are scaled when one is at its limit; v = I0 FWD(applied)
+
+Without a reading y(k) = phi theta, nothing is identified. theta starts at [-2 1 b b 0], b = T_s^2 / (2 I0), with b0 kept in
+[b/2, 2b]; printed: b0, b1 as printed, b0 >= 0.01. Identification starts at the fourth tick (all of phi measured) and
+after a loss with the third reading in a row.
+Fixed form: y rad Q28 (limited to +-8 rad), u, theta, G Q28, F Q20, F phi Q40.
+Source: paper 004, eqs. of the unified method; study of paper 004, sections 1, 3.2 and 4 (there: MIN, MID). Euler angles.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numba.extending import register_jitable
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, Step, offsets
-from firmware_sim.controllers.kinematics import forward_float, inverse_float
+from firmware_sim.controllers.compiled import CompiledLaw, Field, LawRefuses, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.kinematics import (
+    demand_fixed,
+    drive_fixed,
+    forward_fixed,
+    forward_float,
+    inverse_fixed,
+    inverse_float,
+)
+from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, mul_wide, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import AHEAD, NEXT, NOW, PAST
-from protocol.law_tables import DESIGN_PRINTED, Configuration
+from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, NO_LIMIT, Configuration
 
 STATE = (
     Field("theta", 15, "rad, N m", 28),
@@ -25,108 +52,306 @@ STATE = (
     Field("command", 3, "N m", 28),
     Field("eta", 3, "turn", 32),
     Field("rate", 3, "turn/sample", 36),
+    Field("phi", 5, "rad, N m", 28),
+    Field("F_phi", 5, "1", 40, 64),
+    Field("gain", 5, "1", 28),
     Field("steps", 1, "tick", 0),
+    Field("arithmetic", 1, "", 0),
 )
-THETA, F, Y1, Y2, Q0, Q1, Q2, COMMAND, ETA, RATE, STEPS = offsets(STATE)
-DESIGN, C1, C2, KAPPA, FORGETTING, TRACE_MAX, DECOUPLE, IDENTIFY, TS2, LIMIT, I0, B0_MIN, B0_MAX = (
-    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 12, 15, 18)
+(THETA, F, Y, Y_BEFORE, INPUT, BEFORE, OLD, COMMAND, ETA, RATE, PHI, F_PHI, GAIN, STEPS, ARITHMETIC) = offsets(STATE)
+
+# Parameters of both forms; fixed: c1, c2 Q28, the others Q30, mantissas and shifts as in kinematics.py.
+PRINTED, C1, C2, KAPPA, KAPPA_INV, FORGETTING, FORGETTING_INV, TRACE_MAX, DECOUPLE, IDENTIFY, TORQUE_SHIFT = range(11)
+LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT, B0_MIN, B0_MAX = 11, 14, 17, 20, 23, 26, 29
+PARAMETERS = 32
+
+STEPS_MAX = 1000000
 TURN = 2.0 * math.pi
 
 
 @register_jitable
-def near(angle: float, centre: float) -> float:
+def _triple(s: np.ndarray, first: int) -> tuple[float, float, float]:
+    return s[first], s[first + 1], s[first + 2]
+
+
+# -- float reference ---------------------------------------------------------------------------------------------------
+
+
+@register_jitable
+def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    """One tick; par TORQUE_OF = I0 / T_s^2, DRIVE_OF = T_s^2 / I0."""
+    out[0], out[1], out[2], out[3] = 0.0, 0.0, 0.0, 0.0
+    fresh = inp[0] != 0.0
+    if s[STEPS] == 0.0 and not fresh:
+        out[3] = 32.0
+        return
+    _take_inputs_float(s, par, inp)
+    learn = fresh and inp[1] >= 3.0 and s[STEPS] >= 3.0
+    if par[IDENTIFY] != 0.0 and not learn:
+        out[3] += 4.0
+    for i in range(3):
+        if s[STEPS] == 0.0:
+            s[Y + i], s[Y_BEFORE + i] = inp[3 + i], inp[3 + i]
+        model = _predict_float(s, par, i)
+        y = _near_float(inp[3 + i], s[Y + i]) if fresh else model
+        if par[IDENTIFY] != 0.0 and learn:
+            _identify_float(s, par, i, y - model)
+        s[Y_BEFORE + i], s[Y + i] = s[Y + i], y
+        out[i] = _control_float(s, par, ref, i)
+    saturated = 0.0
+    if par[DECOUPLE] != 0.0 and _decouple_float(s, par, ref, out):
+        saturated = 1.0
+    for i in range(3):
+        s[COMMAND + i] = min(max(out[i], -par[LIMIT + i]), par[LIMIT + i])
+        if s[COMMAND + i] != out[i]:
+            saturated = 1.0
+        out[i] = s[COMMAND + i]
+    out[3] += saturated
+    s[STEPS] = min(s[STEPS] + 1.0, 1e6)
+
+
+@register_jitable
+def _near_float(angle: float, centre: float) -> float:
     """angle plus the whole turns that bring it within half a turn of centre."""
     return angle + TURN * math.floor((centre - angle) / TURN + 0.5)
 
 
 @register_jitable
-def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    out[:] = 0.0
-    fresh = inp[0] != 0.0
-    if s[STEPS] == 0.0:
-        if not fresh:
-            out[3] = 32.0
-            return
-        for i in range(3):
-            s[Y1 + i] = s[Y2 + i] = inp[3 + i]
-    printed = par[DESIGN] == 0.0
-    # what acts now
-    v, b, a, u = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    for i in range(3):
-        s[Q2 + i] = s[Q1 + i]
-        s[Q1 + i] = s[Q0 + i]
-        b[i] = s[COMMAND + i]
-        if not printed and inp[2] != 0.0:
-            b[i] = inp[13 + i]
-        b[i] *= par[TS2] / par[I0 + i]
+def _take_inputs_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
+    """v(k), v(k-1), v(k-2); printed: u(k-1), u(k-2), u(k-3)."""
+    known = par[PRINTED] == 0.0 and inp[2] != 0.0
+    v = _triple(inp, 13) if known else _triple(s, COMMAND)
     if par[DECOUPLE] != 0.0:
-        forward_float(s[ETA : ETA + 3], s[RATE : RATE + 3], b, a)
+        b = (v[0] * par[DRIVE_OF], v[1] * par[DRIVE_OF + 1], v[2] * par[DRIVE_OF + 2])
+        a = forward_float(_triple(s, ETA), _triple(s, RATE), b)
+        v = (a[0] * par[TORQUE_OF], a[1] * par[TORQUE_OF + 1], a[2] * par[TORQUE_OF + 2])
+    for i in range(3):
+        s[OLD + i], s[BEFORE + i], s[INPUT + i] = s[BEFORE + i], s[INPUT + i], v[i]
+
+
+@register_jitable
+def _predict_float(s: np.ndarray, par: np.ndarray, i: int) -> float:
+    """phi, and phi theta."""
+    late = 0 if par[PRINTED] != 0.0 else BEFORE - INPUT
+    s[PHI], s[PHI + 1], s[PHI + 4] = -s[Y + i], -s[Y_BEFORE + i], 1.0
+    s[PHI + 2], s[PHI + 3] = s[INPUT + late + i], s[BEFORE + late + i]
+    model = 0.0
+    for m in range(5):
+        model += s[PHI + m] * s[THETA + 5 * i + m]
+    return model
+
+
+@register_jitable
+def _identify_float(s: np.ndarray, par: np.ndarray, i: int, e: float) -> None:
+    trace = 0.0
+    for m in range(5):
+        trace += s[F + 25 * i + 6 * m]
+    forgetting = 1.0 if trace >= par[TRACE_MAX] else par[FORGETTING]
+    denominator = forgetting
+    for m in range(5):
+        s[F_PHI + m] = 0.0
+        for n in range(5):
+            s[F_PHI + m] += s[F + 25 * i + 5 * m + n] * s[PHI + n]
+        denominator += s[F_PHI + m] * s[PHI + m]
+    for m in range(5):
+        s[GAIN + m] = s[F_PHI + m] / denominator
+        s[THETA + 5 * i + m] += s[GAIN + m] * e
+        for n in range(5):
+            p = 25 * i + 5 * m + n
+            s[F + p] = (s[F + p] - s[GAIN + m] * s[F_PHI + n]) / forgetting
+    s[THETA + 5 * i + 2] = min(max(s[THETA + 5 * i + 2], par[B0_MIN + i]), par[B0_MAX + i])
+
+
+@register_jitable
+def _control_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> float:
+    t = THETA + 5 * i
+    a1, a2, b0, b1, d, y = s[t], s[t + 1], s[t + 2], s[t + 3], s[t + 4], s[Y + i]
+    if par[PRINTED] != 0.0:
+        w0, w1, w2 = ref[NEXT + i], ref[NOW + i], ref[PAST + i]
+        s1, t0, t1 = 0.0, par[C1] - a1, par[C2] - a2
     else:
-        a[:] = b
+        w0, w1, w2 = ref[AHEAD + i], ref[NEXT + i], ref[NOW + i]
+        s1 = par[C1] - a1
+        t0, t1 = par[C2] - a2 - a1 * s1, -a2 * s1
+        b0 = (b0 + b1) * par[KAPPA_INV]
+        b1 = par[KAPPA] * b0
+    top = _near_float(w0, y) + par[C1] * _near_float(w1, y) + par[C2] * _near_float(w2, y)
+    top -= t0 * y + t1 * s[Y_BEFORE + i] + (b1 + b0 * s1) * s[INPUT + i] + b1 * s1 * s[BEFORE + i] + (1.0 + s1) * d
+    return top / b0
+
+
+@register_jitable
+def _decouple_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> bool:
+    """out: from I0 times an Euler acceleration to torque; True if it had to be scaled down."""
     for i in range(3):
-        s[Q0 + i] = a[i] * par[I0 + i] / par[TS2]
-    learn = par[IDENTIFY] != 0.0 and fresh and inp[1] >= 3.0 and s[STEPS] >= 3.0
-    phi = np.empty(5)
-    g = np.empty(5)
-    saturated = False
+        out[i] *= par[DRIVE_OF + i]
+        s[RATE + i] = ref[AHEAD + i] - ref[NEXT + i]
+        s[ETA + i] = ref[NEXT + i] + 0.5 * s[RATE + i]
+    body = inverse_float(_triple(s, ETA), _triple(s, RATE), _triple(out, 0))
+    scale = 1.0
     for i in range(3):
-        th = s[THETA + 5 * i : THETA + 5 * i + 5]
-        phi[0], phi[1], phi[4] = -s[Y1 + i], -s[Y2 + i], 1.0
-        phi[2] = s[Q0 + i] if printed else s[Q1 + i]
-        phi[3] = s[Q1 + i] if printed else s[Q2 + i]
-        model = phi[0] * th[0] + phi[1] * th[1] + phi[2] * th[2] + phi[3] * th[3] + phi[4] * th[4]
-        y = near(inp[3 + i], s[Y1 + i]) if fresh else model
-        if learn:
-            f = s[F + 25 * i : F + 25 * i + 25]
-            trace = f[0] + f[6] + f[12] + f[18] + f[24]
-            lam = 1.0 if trace >= par[TRACE_MAX] else par[FORGETTING]
-            den = lam
-            for m in range(5):
-                g[m] = 0.0
-                for n in range(5):
-                    g[m] += f[5 * m + n] * phi[n]
-                den += g[m] * phi[m]
-            eps = y - model
-            for m in range(5):
-                th[m] += g[m] / den * eps
-                for n in range(5):
-                    f[5 * m + n] = (f[5 * m + n] - g[m] * g[n] / den) / lam
-            th[2] = min(max(th[2], par[B0_MIN + i]), par[B0_MAX + i])
-        s[Y2 + i] = s[Y1 + i]
-        s[Y1 + i] = y
-        a1, a2, b0, b1, d = th[0], th[1], th[2], th[3], th[4]
-        if printed:
-            w0, w1, w2 = near(ref[NEXT + i], y), near(ref[NOW + i], y), near(ref[PAST + i], y)
-            s1, t0, t1 = 0.0, par[C1] - a1, par[C2] - a2
-        else:
-            w0, w1, w2 = near(ref[AHEAD + i], y), near(ref[NEXT + i], y), near(ref[NOW + i], y)
-            s1 = par[C1] - a1
-            t0, t1 = par[C2] - a2 - a1 * s1, -a2 * s1
-            b0 = (b0 + b1) / (1.0 + par[KAPPA])
-            b1 = par[KAPPA] * b0
-        top = w0 + par[C1] * w1 + par[C2] * w2 - t0 * y - t1 * s[Y2 + i]
-        top -= (b1 + b0 * s1) * s[Q0 + i] + b1 * s1 * s[Q1 + i] + (1.0 + s1) * d
-        u[i] = top / b0
-    if par[DECOUPLE] != 0.0:
+        out[i] = body[i] * par[TORQUE_OF + i]
+        if abs(out[i]) > par[LIMIT + i]:
+            scale = min(scale, par[LIMIT + i] / abs(out[i]))
+    if scale < 1.0:
         for i in range(3):
-            a[i] = u[i] * par[TS2] / par[I0 + i]
-            s[ETA + i] = 0.5 * (ref[NEXT + i] + ref[AHEAD + i])
-            s[RATE + i] = ref[AHEAD + i] - ref[NEXT + i]
-        inverse_float(s[ETA : ETA + 3], s[RATE : RATE + 3], a, b)
-        k = 1.0
-        for i in range(3):
-            u[i] = b[i] * par[I0 + i] / par[TS2]
-            if abs(u[i]) > par[LIMIT + i]:
-                k = min(k, par[LIMIT + i] / abs(u[i]))
-                out[3] = 1.0
-        for i in range(3):
-            u[i] *= k
+            out[i] *= scale
+    return scale < 1.0
+
+
+# -- fixed form --------------------------------------------------------------------------------------------------------
+
+
+@register_jitable
+def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    """One tick, in integers."""
+    out[0], out[1], out[2], out[3], s[ARITHMETIC] = 0, 0, 0, 0, 0
+    fresh = inp[0] != 0
+    if s[STEPS] == 0 and not fresh:
+        out[3] = 32
+        return
+    _take_inputs_fixed(s, par, inp)
+    learn = fresh and inp[1] >= 3 and s[STEPS] >= 3
+    if par[IDENTIFY] != 0 and not learn:
+        out[3] = 4
     for i in range(3):
-        s[COMMAND + i] = min(max(u[i], -par[LIMIT + i]), par[LIMIT + i])
-        if s[COMMAND + i] != u[i]:
-            out[3] = 1.0
-        out[i] = s[COMMAND + i]
-    s[STEPS] = min(s[STEPS] + 1.0, 1000.0)
+        if s[STEPS] == 0:
+            s[Y + i] = _rad_fixed(s, inp[3 + i], 0)
+            s[Y_BEFORE + i] = s[Y + i]
+        model = _predict_fixed(s, par, i)
+        y = _rad_fixed(s, inp[3 + i], s[Y + i]) if fresh else model
+        if par[IDENTIFY] != 0 and learn:
+            _identify_fixed(s, par, i, sat32(y - model))
+        s[Y_BEFORE + i], s[Y + i] = s[Y + i], y
+        out[i] = _control_fixed(s, par, ref, i)
+    saturated = 0
+    if par[DECOUPLE] != 0 and _decouple_fixed(s, par, ref, out):
+        saturated = 1
+    for i in range(3):
+        s[COMMAND + i] = clip(out[i], -par[LIMIT + i], par[LIMIT + i])
+        if s[COMMAND + i] != out[i]:
+            saturated = 1
+        out[i] = sat32(shift_round(s[COMMAND + i], -par[TORQUE_SHIFT]))
+    out[3] += saturated
+    if s[ARITHMETIC] != 0:
+        out[3] += 8
+    s[STEPS] = min(s[STEPS] + 1, STEPS_MAX)
+
+
+@register_jitable
+def _rad_fixed(s: np.ndarray, angle: int, centre: int) -> int:
+    """rad Q28 of an angle in bam, with the whole turns that bring it within half a turn of `centre` (rad Q28)."""
+    turns = mul_q(centre, 2734261102, 30)  # unwrapped bam
+    return keep32(mul_q(turns + wrap32(angle - turns), 843314857, 31), s, ARITHMETIC)
+
+
+@register_jitable
+def _take_inputs_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
+    if par[PRINTED] == 0 and inp[2] != 0:
+        n = par[TORQUE_SHIFT]
+        v = (sat32(shift_round(inp[13], n)), sat32(shift_round(inp[14], n)), sat32(shift_round(inp[15], n)))
+    else:
+        v = _triple(s, COMMAND)
+    if par[DECOUPLE] != 0:
+        b = (_drive_fixed(par, 0, v[0]), _drive_fixed(par, 1, v[1]), _drive_fixed(par, 2, v[2]))
+        a = forward_fixed(_triple(s, ETA), _triple(s, RATE), b)
+        v = (_torque_fixed(par, 0, a[0]), _torque_fixed(par, 1, a[1]), _torque_fixed(par, 2, a[2]))
+    for i in range(3):
+        s[OLD + i], s[BEFORE + i], s[INPUT + i] = s[BEFORE + i], s[INPUT + i], v[i]
+
+
+@register_jitable
+def _drive_fixed(par: np.ndarray, i: int, torque: int) -> int:
+    """Acceleration, turn36, of a torque Q28 on the inertia I0."""
+    return sat32(mul_q(torque, par[DRIVE_OF + i], par[DRIVE_SHIFT + i]))
+
+
+@register_jitable
+def _torque_fixed(par: np.ndarray, i: int, acceleration: int) -> int:
+    """The torque Q28 that gives the inertia I0 the acceleration, turn36."""
+    return sat32(mul_q(acceleration, par[TORQUE_OF + i], par[DEMAND_SHIFT + i]))
+
+
+@register_jitable
+def _predict_fixed(s: np.ndarray, par: np.ndarray, i: int) -> int:
+    late = 0 if par[PRINTED] != 0 else BEFORE - INPUT
+    s[PHI], s[PHI + 1], s[PHI + 4] = sat32(-s[Y + i]), sat32(-s[Y_BEFORE + i]), 268435456
+    s[PHI + 2], s[PHI + 3] = s[INPUT + late + i], s[BEFORE + late + i]
+    model = 0
+    for m in range(5):
+        model += mul_q(s[PHI + m], s[THETA + 5 * i + m], 28)
+    return keep32(model, s, ARITHMETIC)
+
+
+@register_jitable
+def _identify_fixed(s: np.ndarray, par: np.ndarray, i: int, e: int) -> None:
+    """F Q20, F phi Q40, G Q28. A denominator that rounding brought below its least value leaves F and theta alone."""
+    trace = 0
+    for m in range(5):
+        trace += s[F + 25 * i + 6 * m]
+    forgets = trace < par[TRACE_MAX]
+    least = shift_round(par[FORGETTING], 2) if forgets else 268435456
+    denominator = least
+    for m in range(5):
+        s[F_PHI + m] = 0
+        for n in range(5):
+            s[F_PHI + m] += mul_q(s[F + 25 * i + 5 * m + n], s[PHI + n], 8)
+        denominator += mul_wide(s[F_PHI + m], s[PHI + m], 40)
+    if denominator < least:
+        s[ARITHMETIC] = 1
+        return
+    inverse = div_trunc(1 << 58, denominator)  # Q30
+    scale = par[FORGETTING_INV] if forgets else 1073741824
+    for m in range(5):
+        s[GAIN + m] = keep32(mul_wide(s[F_PHI + m], inverse, 42), s, ARITHMETIC)
+        s[THETA + 5 * i + m] = keep32(s[THETA + 5 * i + m] + mul_q(s[GAIN + m], e, 28), s, ARITHMETIC)
+        for n in range(m, 5):
+            rest = shift_round(s[F + 25 * i + 5 * m + n], -10) - mul_wide(s[F_PHI + n], s[GAIN + m], 38)
+            s[F + 25 * i + 5 * m + n] = keep32(mul_wide(rest, scale, 40), s, ARITHMETIC)
+            s[F + 25 * i + 5 * n + m] = s[F + 25 * i + 5 * m + n]
+    s[THETA + 5 * i + 2] = clip(s[THETA + 5 * i + 2], par[B0_MIN + i], par[B0_MAX + i])
+
+
+@register_jitable
+def _control_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> int:
+    a1, a2, b0, b1 = s[THETA + 5 * i], s[THETA + 5 * i + 1], s[THETA + 5 * i + 2], s[THETA + 5 * i + 3]
+    y, c1, c2, d = s[Y + i], par[C1], par[C2], s[THETA + 5 * i + 4]
+    if par[PRINTED] != 0:
+        w0, w1, w2 = ref[NEXT + i], ref[NOW + i], ref[PAST + i]
+        s1, t0, t1 = 0, sat32(c1 - a1), sat32(c2 - a2)
+    else:
+        w0, w1, w2 = ref[AHEAD + i], ref[NEXT + i], ref[NOW + i]
+        s1 = sat32(c1 - a1)
+        t0, t1 = sat32(c2 - a2 - mul_q(a1, s1, 28)), sat32(-mul_q(a2, s1, 28))
+        b0 = sat32(mul_q(b0 + b1, par[KAPPA_INV], 30))
+        b1 = mul_q(par[KAPPA], b0, 30)
+    top = _rad_fixed(s, w0, y) + mul_q(c1, _rad_fixed(s, w1, y), 28) + mul_q(c2, _rad_fixed(s, w2, y), 28)
+    top -= mul_q(t0, y, 28) + mul_q(t1, s[Y_BEFORE + i], 28) + d + mul_q(s1, d, 28)
+    top -= mul_q(sat32(b1 + mul_q(b0, s1, 28)), s[INPUT + i], 28)
+    top -= mul_q(sat32(mul_q(b1, s1, 28)), s[BEFORE + i], 28)
+    return keep32(div_trunc(shift_round(clip(top, -8589934592, 8589934592), -28), b0), s, ARITHMETIC)
+
+
+@register_jitable
+def _decouple_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> bool:
+    for i in range(3):
+        out[i] = _drive_fixed(par, i, out[i])
+        step = wrap32(ref[AHEAD + i] - ref[NEXT + i])
+        s[RATE + i] = keep32(shift_round(step, -4), s, ARITHMETIC)
+        s[ETA + i] = wrap32(ref[NEXT + i] + shift_round(step, 1))
+    body = inverse_fixed(_triple(s, ETA), _triple(s, RATE), _triple(out, 0))
+    scale = 1073741824
+    for i in range(3):
+        out[i] = _torque_fixed(par, i, body[i])
+        if abs(out[i]) > par[LIMIT + i]:
+            scale = min(scale, div_trunc(shift_round(par[LIMIT + i], -30), abs(out[i])))
+    if scale < 1073741824:
+        for i in range(3):
+            out[i] = mul_q(out[i], scale, 30)
+    return scale < 1073741824
+
+
+# -- the law as the board sees it ----------------------------------------------------------------------------------------
 
 
 @jit.compile
@@ -134,33 +359,71 @@ def _run_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     step_float(s, par, inp, ref, out)
 
 
+@jit.compile
+def _run_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    step_fixed(s, par, inp, ref, out)
+
+
+def nominal_fixed(mantissa: int, shift: int) -> int:
+    """b = T_s^2 / (2 I0), Q28, from drive_fixed(), which counts in turns."""
+    return shift_round(mul_q(mantissa, 1686629713, 30), shift - 21)
+
+
 class Mrac(CompiledLaw):
+    """The law `mrac` in the form of the configuration."""
+
     STATE = STATE
+    functions = (step_float, step_fixed)
+    compiled = (_run_float, _run_fixed)
+
+    def initialise(self, state: np.ndarray) -> None:
+        c = self.configuration
+        one = 1.0 if self.is_float else 1 << 28
+        for i, axis in enumerate(AXES):
+            b = 0.5 * self.par[DRIVE_OF + i]
+            if not self.is_float:
+                b = nominal_fixed(int(self.par[DRIVE_OF + i]), int(self.par[DRIVE_SHIFT + i]))
+            b0, b1 = b, b
+            if c.params["design"] == DESIGN_PRINTED:
+                names = (f"printed_b0_{axis}", f"printed_b1_{axis}")
+                b0, b1 = (c.values[n] if self.is_float else shift_round(c.params[n], 2) for n in names)
+            state[THETA + 5 * i : THETA + 5 * i + 5] = -2 * one, one, b0, b1, 0
+            state[F + 25 * i : F + 25 * i + 25 : 6] = c.values["F0"] if self.is_float else c.params["F0"]
 
     @staticmethod
-    def float_par(configuration: Configuration) -> Sequence[float]:
+    def float_par(configuration: Configuration) -> list[float]:
         v = configuration.values
-        pole = v["c2_pole"]
-        ts2 = (v["period_us"] * 1e-6) ** 2
+        pole, ts2, printed = v["c2_pole"], (v["period_us"] * 1e-6) ** 2, v["design"] == DESIGN_PRINTED
         inertia = configuration.vector("inertia_kgm2")
         b = [ts2 / 2 / i for i in inertia]
-        printed = v["design"] == 0
-        low = [0.01] * 3 if printed else [0.5 * x for x in b]
-        high = [10.0] * 3 if printed else [2 * x for x in b]
-        return [
-            v["design"], -2 * pole, pole * pole, v["kappa"], v["forgetting"], v["trace_max"], v["decouple"],
-            v["identify"], ts2, *configuration.vector("torque_limit"), *inertia, *low, *high,
-        ]
+        par = [float(printed), -2 * pole, pole * pole, v["kappa"], 1 / (1 + v["kappa"])]
+        par += [v["forgetting"], 1 / v["forgetting"], v["trace_max"], v["decouple"], v["identify"], 0.0]
+        par += [*configuration.vector("torque_limit"), *(i / ts2 for i in inertia), *(ts2 / i for i in inertia)]
+        par += [0.0] * 6
+        return par + ([0.01] * 3 + [100.0] * 3 if printed else [x / 2 for x in b] + [x * 2 for x in b])
 
     @staticmethod
-    def float_step() -> Step:
-        return _run_float
+    def fixed_par(configuration: Configuration) -> list[int]:
+        common, p, one = configuration.common, configuration.params, 1 << 30
+        if p["trace_max"] == NO_LIMIT:
+            raise LawRefuses("law mrac: expected a finite trace_max in the fixed form (F is int32 with 20 fractional bits)")
+        drive = [drive_fixed(common["period_us"], p[f"inertia_kgm2_{axis}"]) for axis in AXES]
+        demand = [demand_fixed(m, n) for m, n in drive]
+        b = [nominal_fixed(m, n) for m, n in drive]
+        if max(b) > 2**30 - 1:
+            raise LawRefuses("law mrac: expected T_s^2 / (2 inertia) of at most 4 in the fixed form")
+        printed = int(p["design"] == DESIGN_PRINTED)
+        par = [printed, -shift_round(p["c2_pole"], 1), mul_q(p["c2_pole"], p["c2_pole"], 32)]
+        par += [p["kappa"], div_trunc(1 << 60, one + p["kappa"]), p["forgetting"], div_trunc(1 << 60, p["forgetting"])]
+        par += [p["trace_max"], p["decouple"], p["identify"], common["torque_bits"] - 28, *torque_limits_fixed(common)]
+        par += [m for m, _ in demand] + [m for m, _ in drive] + [n for _, n in demand] + [n for _, n in drive]
+        return par + ([2684355] * 3 + [INT32_MAX] * 3 if printed else [shift_round(x, 1) for x in b] + [shift_round(x, -1) for x in b])
 
-    def initialise(self, state):
-        v = self.configuration.values
-        ts2 = (v["period_us"] * 1e-6) ** 2
-        for i, axis in enumerate("xyz"):
-            b = ts2 / 2 / v[f"inertia_kgm2_{axis}"]
-            b0, b1 = (v[f"printed_b0_{axis}"], v[f"printed_b1_{axis}"]) if v["design"] == 0 else (b, b)
-            state[THETA + 5 * i : THETA + 5 * i + 5] = -2, 1, b0, b1, 0
-            state[F + 25 * i : F + 25 * i + 25 : 6] = v["F0"]
+    def telemetry(self) -> list[int]:
+        s = self.state.tolist()
+        theta, F_ = s[THETA : THETA + 15], [s[F + 25 * i : F + 25 * i + 25 : 6] for i in range(3)]
+        if self.is_float:
+            words = [word_of(x, 2.0**-28) for x in theta] + [word_of(sum(f), 2.0**-16) for f in F_]
+        else:
+            words = theta + [shift_round(sum(f), 4) for f in F_]
+        return limited(words, MRAC.telemetry)
