@@ -156,6 +156,9 @@ class Run:
     def __len__(self) -> int:
         return len(self.truth)
 
+    def __repr__(self) -> str:
+        return f"<Run {self.name}: {len(self)} ticks of {self.period_s:g} s, {self.end.get('reason')}, {self.path}>"
+
     @property
     def tick(self) -> Array:
         """(N,) tick numbers."""
@@ -200,6 +203,16 @@ class Run:
     def applied_Nm(self) -> Array:
         """(N, 3) torque acting from the tick on, N m."""
         return self["applied_Nm"]
+
+    @property
+    def omega_radps(self) -> Array:
+        """(N, 3) body rate omega_BN, body axes, rad/s."""
+        return self["omega_radps"]
+
+    @property
+    def q_BN(self) -> Array:
+        """(N, 4) attitude in inertial space, scalar first."""
+        return self["q_BN"]
 
     @property
     def momentum_Nms(self) -> Array:

@@ -1,8 +1,9 @@
 """Two runs held against each other: identical, or the first frame that differs, decoded side by side.
 
 Frames are compared in recorded order (tick, direction, type, sequence) with all their bytes and their fate, then truth
-row by row, bit for bit. What the runs were (scenario, seed, versions, hashes) is reported beside, as is whether the
-files are the same.
+row by row, bit for bit. CONFIG is compared word by word and reported apart, so that the first frame that differs tells
+what another parameter led to. What the runs were (scenario, seed, versions, hashes) is reported beside, as is whether
+the files are the same.
 """
 
 from __future__ import annotations
@@ -14,10 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from protocol import frames
-from protocol.law_tables import COMMON, LAWS, TELEMETRY_COMMON
+from protocol.law_tables import COMMON, LAWS, ROW_WORDS, TELEMETRY_COMMON, LawTable
 from sil.runs import PacketRow, Run, wrapped_deg
+from sil.sinks.events import describe
 
 ABSENT = "(absent)"
+_FIELDS_SHOWN = 16  # of longer frames only what differs is printed
+_LINES_SHOWN = 12
+_CONFIG_TYPE = 1
+_CELL = 34  # characters
 
 
 class PacketDifference(NamedTuple):
@@ -41,14 +47,15 @@ class TruthDifference(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """What `diff` found. `identical`: same frames, fates, truth and length; versions may differ all the same."""
+    """What `diff` found. `identical`: same CONFIG, frames, fates, truth and length; versions may still differ."""
 
     a: str
     b: str
     identical: bool
     same_file: bool
     ticks: tuple[int, int]
-    compared_packets: int  # equal ones before the first difference
+    compared_packets: int  # equal ones before the first difference, CONFIG apart
+    config: list[tuple[str, Any, Any]]  # words that differ: (name, in a, in b), wire units
     packet: PacketDifference | None
     truth: TruthDifference | None
     identity: list[tuple[str, Any, Any]]  # (key, in a, in b)
@@ -60,6 +67,7 @@ class Difference(NamedTuple):
             **self._asdict(),
             "packet": self.packet._asdict() if self.packet else None,
             "truth": {key: value if np.isfinite(value) else None for key, value in truth.items()} or None,
+            "config": [{"word": word, "a": a, "b": b} for word, a, b in self.config],
             "identity": [{"key": key, "a": a, "b": b} for key, a, b in self.identity],
         }
 
@@ -68,13 +76,15 @@ def diff(a: Run, b: Run) -> Difference:
     """Compare two runs."""
     equal, packet = _first_packet(a, b)
     truth = _truth(a, b)
+    config = _config(a, b)
     return Difference(
         str(a.path),
         str(b.path),
-        packet is None and truth is None and len(a) == len(b),
+        not config and packet is None and truth is None and len(a) == len(b),
         a.path.read_bytes() == b.path.read_bytes(),
         (len(a), len(b)),
         equal,
+        config,
         packet,
         truth,
         list(_identity(a, b)),
@@ -87,15 +97,18 @@ def text(found: Difference) -> str:
         files = "same file bytes" if found.same_file else "the files differ in what the runs say of themselves"
         lines = [f"identical: {found.ticks[0]} ticks, {found.compared_packets} frames, truth bit for bit; {files}"]
     else:
-        lines = list(_packet_lines(found)) + list(_truth_lines(found))
+        lines = [f"CONFIG differs: {word}: {x} and {y}" for word, x, y in found.config[:_LINES_SHOWN]]
+        if len(found.config) > _LINES_SHOWN:
+            lines.append(f"CONFIG differs in {len(found.config) - _LINES_SHOWN} words more")
+        lines += [*_packet_lines(found), *_truth_lines(found)]
     if found.identity:
-        lines += ["", f"{'what the runs were':<36}{'a':<28}b"]
-        lines += [f"  {key:<34}{_cell(x):<28}{_cell(y)}" for key, x, y in found.identity]
+        lines += ["", f"{'what the runs were':<38}{'a':<36}b"]
+        lines += [f"  {key:<35} {_short(x):<35} {_short(y)}" for key, x, y in found.identity]
     return "\n".join(lines)
 
 
-def fields_of(packet: bytes) -> dict[str, Any]:
-    """A packet's fields by name, TELEMETRY and CONFIG words by their table's names; `unreadable` where it is none."""
+def fields_of(packet: bytes, law: LawTable | None = None) -> dict[str, Any]:
+    """A packet's fields by name, words by the names of the law's table; `unreadable` where it cannot be unpacked."""
     try:
         whole = frames.unpack(packet)
     except frames.BadPacket as error:
@@ -104,45 +117,76 @@ def fields_of(packet: bytes) -> dict[str, Any]:
     fields: dict[str, Any] = {"type": frames.Type(whole.type).name, "sequence": whole.sequence}
     for name, value in frame._asdict().items():
         if name == "words":
-            fields |= _named_words(frame)
+            fields |= _named_words(frame, law)
         elif name == "readings":
             names = ("euler", "quaternion", "rate")
             fields |= {n: list(r.values) + [f"age {r.age_us} us"] for n, r in zip(names, value, strict=True) if r}
         else:
             fields[name] = list(value) if isinstance(value, tuple) else value
+    if isinstance(frame, frames.Event):
+        fields["meaning"] = describe(frame.code, frame.a, frame.b)[1]
     return fields
 
 
-def _named_words(frame: frames.Telemetry | frames.Config) -> dict[str, int]:
+def _named_words(frame: frames.Telemetry | frames.Config, law: LawTable | None) -> dict[str, int]:
     if isinstance(frame, frames.Telemetry):
-        law = LAWS.get((frame.law_id, frame.law_version))
-        names = [word.name for word in (*TELEMETRY_COMMON, *(law.telemetry if law else ()))]
-        first = 0
-    else:
-        names, first = [word.name for word in COMMON], frame.offset
-    place = enumerate(frame.words, first)
-    return {names[i] if i < len(names) else f"word_{i}": value for i, value in place}
+        names, first = [word.name for word in (*TELEMETRY_COMMON, *(law.telemetry if law else ()))], 0
+        return {names[i] if i < len(names) else f"word_{i}": value for i, value in enumerate(frame.words)}
+    names, first = [word.name for word in (*COMMON, *(law.params if law else ()))], frame.offset
+    return {_config_name(i, names, law): value for i, value in enumerate(frame.words, first)}
+
+
+def _config_name(index: int, names: list[str], law: LawTable | None) -> str:
+    """A CONFIG word's name: COMMON, the law's parameters, then guidance rows."""
+    if index < len(names):
+        return names[index]
+    if law is None:
+        return f"word_{index}"
+    row, part = divmod(index - len(names), ROW_WORDS)
+    return f"row {row} {('tick', 'x', 'y', 'z')[part]}"
+
+
+def _law_of(run: Run) -> LawTable | None:
+    return LAWS.get((run.config_words.get("law_id", 0), run.config_words.get("law_version", 0)))
 
 
 def _first_packet(a: Run, b: Run) -> tuple[int, PacketDifference | None]:
     """(equal frames before it, the first difference)."""
-    for count, (x, y) in enumerate(zip_longest(a.packets, b.packets)):
+    laws = _law_of(a), _law_of(b)
+    rows = [[row for row in run.packets if row.type != _CONFIG_TYPE] for run in (a, b)]
+    for count, (x, y) in enumerate(zip_longest(*rows)):
         if x == y:
             continue
         if x is not None and y is not None and _place(x) != _place(y):
             x, y = (x, None) if _place(x) < _place(y) else (None, y)  # the earlier one is missing in the other run
-        return count, _compared(x, y)
-    return len(a.packets), None
+        return count, _compared(x, y, laws)
+    return len(rows[0]), None
+
+
+def _config(a: Run, b: Run) -> list[tuple[str, Any, Any]]:
+    """Words of CONFIG that differ, by name."""
+    named = []
+    for run in (a, b):
+        law = _law_of(run)
+        names = [word.name for word in (*COMMON, *(law.params if law else ()))]
+        words = enumerate(run.config_words.get("words", ()))
+        named.append({_config_name(i, names, law): value for i, value in words})
+    x, y = named
+    pairs = ((name, x.get(name, ABSENT), y.get(name, ABSENT)) for name in dict.fromkeys([*x, *y]))
+    return [pair for pair in pairs if pair[1] != pair[2]]
 
 
 def _place(row: PacketRow) -> tuple[int, bool, int, int]:
     return row.tick, row.direction == "down", row.type, row.sequence
 
 
-def _compared(x: PacketRow | None, y: PacketRow | None) -> PacketDifference:
+def _compared(
+    x: PacketRow | None, y: PacketRow | None, laws: tuple[LawTable | None, LawTable | None]
+) -> PacketDifference:
     row = x or y
     assert row is not None
-    a, b = ({} if r is None else {**fields_of(r.packet), "fate": r.fate} for r in (x, y))
+    pairs = zip((x, y), laws, strict=True)
+    a, b = ({} if r is None else {**fields_of(r.packet, law), "fate": r.fate} for r, law in pairs)
     if x is not None and y is not None and x.encoded != y.encoded:
         a["encoded"], b["encoded"] = x.encoded.hex(), y.encoded.hex()
     names = dict.fromkeys([*a, *b])
@@ -200,15 +244,19 @@ def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _packet_lines(found: Difference) -> Iterator[str]:
     packet = found.packet
     if packet is None:
-        yield f"same frames ({found.compared_packets})"
+        yield f"frames: the same ({found.compared_packets}), CONFIG apart" if found.config else "frames: the same"
         return
     yield f"differs at tick {packet.tick}: {packet.what}, after {found.compared_packets} equal frames"
     if not packet.a or not packet.b:
         yield f"  it is only in {'b' if packet.b else 'a'}"
-    yield f"  {'field':<20}{'a':<40}b"
-    for name in dict.fromkeys([*packet.a, *packet.b]):
+    yield f"  {'field':<24}{'a':<36}b"
+    names = list(dict.fromkeys([*packet.a, *packet.b]))
+    shown = names if len(names) <= _FIELDS_SHOWN else packet.differing
+    for name in shown:
         mark = "*" if name in packet.differing else " "
-        yield f"{mark} {name:<20}{_cell(packet.a.get(name, ABSENT)):<40}{_cell(packet.b.get(name, ABSENT))}"
+        yield f"{mark} {name:<24}{_cell(packet.a.get(name, ABSENT)):<36}{_cell(packet.b.get(name, ABSENT))}"
+    if len(shown) < len(names):
+        yield f"  ({len(names) - len(shown)} equal fields not shown)"
 
 
 def _truth_lines(found: Difference) -> Iterator[str]:
@@ -226,3 +274,9 @@ def _truth_lines(found: Difference) -> Iterator[str]:
 
 def _cell(value: Any) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def _short(value: Any) -> str:
+    """One cell of a table: what is too long for it is cut, since --json has it whole."""
+    text_ = _cell(value)
+    return text_ if len(text_) <= _CELL else text_[: _CELL - 1] + "…"

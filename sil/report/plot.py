@@ -216,7 +216,7 @@ def _page(run: Run, what: str, panels: int) -> tuple[Figure, list[Axes]]:
     figure = Figure(figsize=(WIDTH_in, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     axes = np.atleast_1d(figure.subplots(panels, 1, sharex=True))
-    figure.subplots_adjust(left=0.085, right=0.865, top=1 - head / height, bottom=foot / height, hspace=0.25)
+    figure.subplots_adjust(left=0.085, right=0.855, top=1 - head / height, bottom=foot / height, hspace=0.25)
     figure.text(0.085, 1 - 0.36 / height, _heading(run, what), fontsize=15, fontweight="bold", color=INK, va="center")
     figure.text(0.085, 1 - 0.64 / height, _facts(run), fontsize=10, color=FAINT, va="center")
     axes[-1].set_xlabel("time in s", fontsize=11, color=INK)

@@ -87,7 +87,7 @@ def _descriptor_set(message_type: Any) -> bytes:
         seen.add(file.name)
         for dependency in file.dependencies:
             add(dependency)
-        file.CopyToProto(result.file.add())
+        result.file.add().ParseFromString(file.serialized_pb)  # as generated, whatever the protobuf runtime makes of it
 
     add(message_type.DESCRIPTOR.file)
     return bytes(result.SerializeToString(deterministic=True))

@@ -95,7 +95,7 @@ def test_identical_runs(run: Run, folder: Path) -> None:
     found = diff.diff(run, made(folder / "again"))
     assert found.identical
     assert found.same_file
-    assert diff.text(found) == "identical: 200 ticks, 602 frames, truth bit for bit; same file bytes"
+    assert diff.text(found) == "identical: 200 ticks, 601 frames, truth bit for bit; same file bytes"
 
 
 def test_one_altered_command_is_found_at_its_tick(run: Run, folder: Path) -> None:
@@ -134,6 +134,14 @@ def test_identity_differences_are_named(run: Run, folder: Path) -> None:
     found = diff.diff(run, made(folder / "longer", ticks=201))
     assert ("scenario.duration_s", 100.0, 100.5) in found.identity
     assert "scenario.duration_s" in diff.text(found)
+
+
+def test_another_parameter_is_a_config_difference_and_what_it_led_to(run: Run, folder: Path) -> None:
+    found = diff.diff(run, made(folder / "sparse", telemetry_every=2))
+    assert found.config == [("telemetry_every", 1, 2)]
+    assert found.packet is not None
+    assert (found.packet.tick, found.packet.what, found.packet.differing) == (1, "COMMAND, down", ["follows"])
+    assert diff.text(found).startswith("CONFIG differs: telemetry_every: 1 and 2\ndiffers at tick 1: COMMAND, down")
 
 
 # -- pictures ----------------------------------------------------------------------------------------------------------
