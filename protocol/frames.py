@@ -310,7 +310,9 @@ def _read_tick(packet: bytes, tick: int) -> Tick:
 
 
 def _read_timing(packet: bytes, tick: int) -> Timing:
-    return Timing(tick, *_exactly(_TIMING, packet))
+    timing = Timing(tick, *_exactly(_TIMING, packet))
+    _ticked(Type.TIMING, tick)
+    return timing
 
 
 def _read_stop(packet: bytes, tick: int) -> Stop:

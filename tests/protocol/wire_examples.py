@@ -72,6 +72,6 @@ any_frame = st.one_of(
     st.builds(f.Hello, u16, st.integers(0, 1), u8, u32, u64, u32, text),
     st.builds(f.Ready, u16, u16, u32),
     st.builds(f.Tick, tick),
-    st.builds(f.Timing, u32, u32, u32, u32, u32),
+    st.builds(f.Timing, tick, u32, u32, u32, u32),
     st.builds(f.Stop, u16),
 )
