@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from sil.runs import COLUMNS, Run
+from sil.run_columns import COLUMNS
+from sil.runs import Run
 
 _ROWS_AT_ONCE = 4096
 STDOUT = "-"

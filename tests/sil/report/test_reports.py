@@ -16,7 +16,8 @@ from synthetic import synthetic_journal
 from sil.report import diff, info
 from sil.report.export import ExportError, export
 from sil.report.plot import PlotError, pages, plot
-from sil.runs import COLUMNS, Run, open_run
+from sil.run_columns import COLUMNS
+from sil.runs import Run, open_run
 from sil.sinks.seal import seal
 
 

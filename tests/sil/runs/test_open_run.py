@@ -15,7 +15,8 @@ from mcap.writer import Writer
 from synthetic import PERIOD_S, START_DEG, synthetic_journal
 
 import sil.runs
-from sil.runs import COLUMNS, Run, RunError, open_run
+from sil.run_columns import COLUMNS
+from sil.runs import Run, RunError, open_run
 from sil.sinks.seal import seal
 
 HEADER = (

@@ -84,16 +84,26 @@ def rates(ym: np.ndarray, r: np.ndarray, kind: int, lead: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lead", [1, 2])
-def test_bumpless_start_by_the_law_stands_still_first(lead: int) -> None:
-    reported = NAN.copy()
+@pytest.mark.parametrize("rate_found", [0.0, 0.002])
+def test_bumpless_start_by_the_law_stands_still_then_goes_on_at_the_rate_it_found(lead: int, rate_found: float) -> None:
+    """Starts at rows 0 to 3; after the last one the board reports a trajectory that begins at `rate_found`."""
+    still = 3 + lead
+    begun = NAN.copy()
+    begun[0] = 0.103
+    truth = recompute(model(REFERENCE_ZOH, lead), setpoints(), begun, NAN, [Start(0, True)])
+    reported, rate = NAN.copy(), np.zeros((N, 3))
     reported[:4] = np.arange(4)[:, None] * 0.001 + 0.1
+    reported[4 : still + 1] = 0.103
+    reported[still + 1 :] = truth[still + 1 :] + rate_found
+    rate[still + 1 :] = rates(truth, setpoints(), REFERENCE_ZOH, lead)[still + 1 :] + rate_found
     starts = [Start(0, True), Start(1, False), Start(2, False), Start(3, False)]
-    made = recompute(model(REFERENCE_ZOH, lead), setpoints(), reported, np.zeros((N, 3)), starts)
+    made = recompute(model(REFERENCE_ZOH, lead), setpoints(), reported, rate, starts)
     assert np.array_equal(made[:4], reported[:4])
-    assert (made[3 : 3 + lead + 1] == made[3]).all()
-    assert (made[3 + lead + 1] < made[3]).all()
-    k1 = (1 - POLE) ** 2
-    assert made[3 + lead + 1] == pytest.approx(made[3] * (1 - k1 / 2), abs=1e-15)
+    assert (made[3 : still + 1] == made[3]).all()
+    assert np.array_equal(made[still + 1], reported[still + 1])
+    moved = made[still + 2] - made[still + 1]
+    assert np.abs(moved - (truth[still + 2] - truth[still + 1])).max() < 3 * rate_found + 1e-9
+    assert (moved > -0.01).all()
 
 
 def test_limits_hold() -> None:
