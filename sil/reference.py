@@ -11,7 +11,8 @@ Per axis, angles in rad, rates per sample, r(k) the set-point, d the lead, p = e
 Where it starts (y is the reference the board reported at tick s):
     model start (REFERENCE_RESTART with b = 1): ym = y up to s + d - 1, where with zoh the rate is
         vm0 = 2 ((1-p)/(1+p))^2 (r - y), as after r(s-1) = r(s), and 0 with paper; r(s) acts from there on;
-    bumpless start by the law (b = 0): ym = y and vm = 0 up to s + d; r(s+1) is the first that acts.
+    bumpless start by the law (b = 0): ym = y up to s + d; it goes on from there at the rate the law found, which
+        TELEMETRY first shows at s + d + 1; r(s+1) is the first that acts.
 Source: study of paper 004, sections 0 and 3.1; protocol/SPEC.md.
 """
 
@@ -99,12 +100,18 @@ def _segment(
 ) -> None:
     """Fill result[seed:stop] from what TELEMETRY said at row `seed`."""
     still_until = start.row + model.lead - (1 if start.by_model else 0)  # the last index at which ym is still y
+    if not start.by_model and seed <= still_until:
+        result[seed : min(still_until + 1, stop)] = reported[seed]
+        later = np.flatnonzero(np.isfinite(reported[still_until + 1 : stop]).all(axis=1))
+        if not later.size:
+            return
+        seed = still_until + 1 + int(later[0])
     for axis in range(3):
         r = setpoint[:, axis].tolist()
         y, v, head = float(reported[seed, axis]), float(rate[seed, axis]), seed
         if seed <= still_until:
             result[seed : min(still_until, stop - 1) + 1, axis] = y
-            v = model.start_rate * _wrap(r[start.row] - y) if start.by_model else 0.0
+            v = model.start_rate * _wrap(r[start.row] - y)
             v = min(max(v, -model.rate_limit), model.rate_limit)
             head = still_until
         if head < stop:
