@@ -9,12 +9,13 @@ from typing import IO
 
 from sil.run_columns import COLUMNS
 from sil.runs import Run
+from sil.trouble import UsageError
 
 _ROWS_AT_ONCE = 4096
 STDOUT = "-"
 
 
-class ExportError(Exception):
+class ExportError(UsageError):
     """The CSV cannot be written: one line."""
 
 

@@ -30,7 +30,7 @@ def info(run: Run) -> dict[str, Any]:
         "ticks": len(run),
         "period_s": run.period_s,
         "duration_s": len(run) * run.period_s,
-        "law": {**_mapping(run.meta.get("law")), **_mapping(run.scenario.get("law"))},
+        "law": {**_mapping(run.meta.get("law")), **_mapping(run.scenario.get("law"))} if run.config_words else None,
         "seed": run.meta.get("seed"),
         "identity": {key: value for key, value in sorted(run.meta.items()) if key not in ("name", "law", "seed")},
         "metrics": metrics,
@@ -47,7 +47,7 @@ def info(run: Run) -> dict[str, Any]:
 
 def text(content: Mapping[str, Any]) -> str:
     """The same for reading."""
-    law = content["law"]
+    law = content["law"] or {}
     lines = [
         _row("run", content["run"]),
         _row("scenario", content["name"]),

@@ -18,16 +18,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sil.runs import Array, Run
+from sil.trouble import UsageError
 
 AXIS_NAMES = ("roll", "pitch", "yaw")
 COLOURS = ("#D55E00", "#009E73", "#0072B2")
+DARK = ("#6E2F00", "#004D38", "#002F4D")  # the same, for the reference over the attitude
 INK, FAINT, GRID = "#222222", "#7A7A7A", "#DDDDDD"
 WIDTH_in, PANEL_in, DPI = 12.0, 2.5, 100
 FORMATS = (".png", ".pdf")
 _POINTS_MAX = 6000  # per line: more than a page can show
 
 
-class PlotError(Exception):
+class PlotError(UsageError):
     """The picture cannot be made: one line."""
 
 
@@ -59,14 +61,16 @@ def plot(run: Run, out: Path) -> list[Path]:
 
 
 def pages(run: Run) -> list[Page]:
-    """All pages of a run; those without data (no board: no identification) are left out."""
+    """All pages of a run; those without data (no board: no error, no identification) are left out."""
     made = [
         Page("overview", overview(run)),
-        Page("attitude", per_axis(run, "Attitude against reference", _attitude_of_axis, _attitude_key(run, True))),
-        Page("error", per_axis(run, "Tracking error: attitude − reference", _error_of_axis, ())),
+        Page("attitude", per_axis(run, _attitude_title(run), _attitude_of_axis, _attitude_key(run, True))),
+        Page("error", per_axis(run, _error_title(run), _error_of_axis, ())),
         Page("torque", per_axis(run, "Torque on the body", _torque_of_axis, _torque_key(run))),
         Page("momentum", stack(run, "Wheel momentum", [_momentum])),
     ]
+    if not _controlled(run):
+        made = [page for page in made if page.name != "error"]
     identified = _identification_panels(run)
     if identified:
         made.append(Page("identification", stack(run, "Identification", identified)))
@@ -76,6 +80,8 @@ def pages(run: Run) -> list[Page]:
 def overview(run: Run) -> Figure:
     """Everything on one page, the three axes in one panel each."""
     panels: list[Panel] = [_attitude, _error, _torque, _momentum]
+    if not _controlled(run):
+        panels.remove(_error)
     return stack(run, "", [*panels, *_identification_panels(run)[:1]])
 
 
@@ -112,20 +118,18 @@ def per_axis(run: Run, what: str, panel: AxisPanel, key: Iterable[Line2D]) -> Fi
 
 def _attitude(ax: Axes, run: Run) -> None:
     for i in range(3):
-        _line(ax, run.t_s, run.setpoint_deg[:, i], color=COLOURS[i], lw=0.9, ls=":", alpha=0.8, step=True)
-        _line(ax, run.t_s, run.attitude_deg[:, i], color=COLOURS[i], lw=1.7)
-        _line(ax, run.t_s, run.reference_deg[:, i], color=INK, lw=0.9, ls=(0, (5, 3)))
-    _finish(ax, "attitude", "deg", "Attitude against reference")
+        if _controlled(run):
+            _line(ax, run.t_s, run.setpoint_deg[:, i], color=COLOURS[i], lw=0.9, ls=":", alpha=0.8, step=True)
+        _line(ax, run.t_s, _unbroken(run.attitude_deg[:, i]), color=COLOURS[i], lw=1.7)
+        _line(ax, run.t_s, _unbroken(run.reference_deg[:, i]), color=DARK[i], lw=1.0, ls=(0, (5, 3)))
+    _finish(ax, "attitude", "deg", _attitude_title(run))
     _legend(ax, [*_axis_key(), *_attitude_key(run)])
 
 
 def _error(ax: Axes, run: Run) -> None:
-    error, what = run.error_deg, "attitude − reference"
-    if not np.isfinite(error).any():
-        error, what = run.setpoint_error_deg, "attitude − set-point"
     for i in range(3):
-        _line(ax, run.t_s, error[:, i], color=COLOURS[i], lw=1.2)
-    _finish(ax, "error", "deg", f"Tracking error: {what}", zero=True)
+        _line(ax, run.t_s, _unbroken(_error_deg(run)[:, i]), color=COLOURS[i], lw=1.2)
+    _finish(ax, "error", "deg", _error_title(run), zero=True)
 
 
 def _torque(ax: Axes, run: Run) -> None:
@@ -150,15 +154,16 @@ def _momentum(ax: Axes, run: Run) -> None:
 
 
 def _attitude_of_axis(ax: Axes, run: Run, i: int) -> None:
-    _line(ax, run.t_s, run.setpoint_deg[:, i], color=FAINT, lw=1.1, ls=":", step=True)
-    _line(ax, run.t_s, run.attitude_deg[:, i], color=COLOURS[i], lw=2.0)
-    _line(ax, run.t_s, run.reference_deg[:, i], color=INK, lw=1.0, ls=(0, (5, 3)))
+    if _controlled(run):
+        _line(ax, run.t_s, run.setpoint_deg[:, i], color=FAINT, lw=1.1, ls=":", step=True)
+    _line(ax, run.t_s, _unbroken(run.attitude_deg[:, i]), color=COLOURS[i], lw=2.0)
+    _line(ax, run.t_s, _unbroken(run.reference_deg[:, i]), color=INK, lw=1.0, ls=(0, (5, 3)))
     _finish(ax, "attitude", "deg", "")
 
 
 def _error_of_axis(ax: Axes, run: Run, i: int) -> None:
-    error = run.error_deg if np.isfinite(run.error_deg).any() else run.setpoint_error_deg
-    _line(ax, run.t_s, error[:, i], color=COLOURS[i], lw=1.2)
+    error = _error_deg(run)
+    _line(ax, run.t_s, _unbroken(error[:, i]), color=COLOURS[i], lw=1.2)
     _finish(ax, "error", "deg", "", zero=True)
     rms = float(np.sqrt(np.nanmean(np.square(error[:, i])))) if np.isfinite(error[:, i]).any() else float("nan")
     peak = float(np.nanmax(np.abs(error[:, i]))) if np.isfinite(error[:, i]).any() else float("nan")
@@ -172,6 +177,37 @@ def _torque_of_axis(ax: Axes, run: Run, i: int) -> None:
     _limits(ax, run, factor, (i,))
     _finish(ax, "torque", unit, "", zero=True)
     _focus(ax, run.applied_Nm[:, i] * factor)
+
+
+# -- what a run has ----------------------------------------------------------------------------------------------------
+
+
+def _controlled(run: Run) -> bool:
+    """A board answered, or at least was asked."""
+    return bool(run.config_words) or len(run.commands) > 0
+
+
+def _error_deg(run: Run) -> Array:
+    """attitude - reference, or - set-point where the board has no reference model."""
+    return run.error_deg if np.isfinite(run.error_deg).any() else run.setpoint_error_deg
+
+
+def _error_title(run: Run) -> str:
+    return "Tracking error: attitude − " + ("reference" if np.isfinite(run.error_deg).any() else "set-point")
+
+
+def _attitude_title(run: Run) -> str:
+    return "Attitude against reference" if np.isfinite(run.reference_deg).any() else "Attitude"
+
+
+def _unbroken(angle_deg: Array) -> Array:
+    """The same with a gap where it jumps from one end of the turn to the other, so that no line is drawn across."""
+    jumps = np.flatnonzero(np.abs(np.diff(angle_deg)) > 180.0) + 1
+    if not jumps.size:
+        return angle_deg
+    result = angle_deg.copy()
+    result[jumps] = np.nan
+    return result
 
 
 # -- identification ----------------------------------------------------------------------------------------------------
@@ -234,12 +270,14 @@ def _heading(run: Run, what: str) -> str:
 def _facts(run: Run) -> str:
     law: Any = run.scenario.get("law") or run.meta.get("law") or {}
     parts = []
+    if not _controlled(run):
+        law = {"name": "none: torque from a schedule"}
     if isinstance(law, dict) and law.get("name"):
         form = law.get("form")
         parts.append(f"law {law['name']}" + (f" ({form})" if form else ""))
     parts.append(f"sampling {run.period_s:g} s")
     delay = run.scenario.get("transport_delay_ticks")
-    if delay is not None:
+    if delay is not None and _controlled(run):
         parts.append(f"transport delay {delay} tick" + ("" if delay == 1 else "s"))
     parts.append(f"{len(run)} ticks, {run.end.get('reason', '')}")
     return "   ·   ".join(parts)
@@ -274,7 +312,9 @@ def _attitude_key(run: Run, with_attitude: bool = False) -> list[Line2D]:
     key = [Line2D([], [], color=FAINT, lw=2.2, label="attitude")] if with_attitude else []
     if np.isfinite(run.reference_deg).any():
         key.append(Line2D([], [], color=INK, lw=1.0, ls=(0, (5, 3)), label="reference"))
-    return [*key, Line2D([], [], color=FAINT, lw=1.1, ls=":", label="set-point")]
+    if _controlled(run):
+        key.append(Line2D([], [], color=FAINT, lw=1.1, ls=":", label="set-point"))
+    return key
 
 
 def _torque_key(run: Run) -> list[Line2D]:

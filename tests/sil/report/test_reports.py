@@ -177,9 +177,18 @@ def test_one_file_by_suffix(run: Run, tmp_path: Path) -> None:
         plot(run, tmp_path / "no" / "run.png")
 
 
-def test_runs_with_gaps_and_without_board_are_drawn(tmp_path: Path) -> None:
+def test_a_run_without_reference_is_drawn_against_its_setpoint(tmp_path: Path) -> None:
     run = made(tmp_path / "a", ticks=40, lose=(5, 6), telemetry_every=7)
-    run._columns["command_Nm"] = np.full((40, 3), np.nan)
     run.telemetry.clear()
     run.__dict__.update(_reference_deg=np.full((40, 3), np.nan), _error_deg=np.full((40, 3), np.nan))
-    assert len(plot(run, tmp_path / "pictures")) == 5
+    assert [page.name for page in pages(run)] == ["overview", "attitude", "error", "torque", "momentum"]
+    assert "set-point" in pages(run)[2].figure.texts[0].get_text()
+
+
+def test_a_run_without_board_has_no_error_to_show(tmp_path: Path) -> None:
+    run = made(tmp_path / "a", ticks=40)
+    run.config_words.clear()
+    run.commands = run.commands[:0]
+    run.__dict__.update(_reference_deg=np.full((40, 3), np.nan), _error_deg=np.full((40, 3), np.nan))
+    assert [page.name for page in pages(run)] == ["overview", "attitude", "torque", "momentum"]
+    assert "none: torque from a schedule" in pages(run)[0].figure.texts[1].get_text()
