@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import stat
 import termios
@@ -102,4 +103,6 @@ def _open_pty(path: str) -> int:
 def _reason(error: Exception) -> str:
     """One line, without the errno and the path that pyserial repeats."""
     number = getattr(error, "errno", None)
+    if number == errno.EWOULDBLOCK:
+        return "another program has it open"
     return os.strerror(number) if number else str(error).splitlines()[0]

@@ -16,6 +16,7 @@ import pytest
 from protocol import frames as f
 from protocol import link as link_module
 from protocol.links import LinkClosed, LinkError, open_link
+from protocol.links import serial as serial_module
 from protocol.links import udp as udp_module
 from protocol.links.inproc import pair
 from protocol.links.udp import UdpBoard, UdpLab
@@ -135,6 +136,29 @@ def test_serial_refuses_what_is_no_port(tmp_path: Path) -> None:
 def test_serial_url_is_checked(url: str) -> None:
     with pytest.raises(LinkError, match=r"expected serial:///dev/X\?baud=N"):
         open_link(url, listen=True)
+
+
+def test_a_real_port_is_opened_exclusively_and_drained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Through pyserial, as a real port is; a pty stands in for the UART. What lay in its buffer before is gone."""
+    monkeypatch.setattr(serial_module, "_is_pty", lambda path: False)
+    with open_link("pty", listen=False) as lab:
+        path = lab.url.removeprefix("serial://")
+        lab.send(b"from another time")
+        url = f"serial://{path}?baud=57600"
+        with open_link(url, listen=True) as board:
+            assert isinstance(board, serial_module.SerialLink)
+            assert (board.url, board.baud) == (url, 57600)
+            assert board.receive(0.05) == b""
+            lab.send(bytes(range(256)))
+            assert board.receive(1.0) == bytes(range(256))
+            board.send(bytes(range(256)))
+            assert lab.receive(1.0) == bytes(range(256))
+            with pytest.raises(LinkError, match=rf"^serial {path}: cannot open: another program has it open$"):
+                open_link(url, listen=True)
+            board.close()
+            board.close()
+        with pytest.raises(LinkClosed):
+            lab.receive(1.0)
 
 
 def test_unplugged_port_is_named() -> None:
