@@ -11,7 +11,9 @@ intermediate fits int64. Numba compiles them; un-jitted, with Python integers, t
 
 from __future__ import annotations
 
-from numba.extending import register_jitable
+import numpy as np
+
+from firmware_sim.jit import callee
 
 INT32_MIN, INT32_MAX = -(2**31), 2**31 - 1
 MASK32 = 0xFFFFFFFF
@@ -21,55 +23,55 @@ QUARTER_TURN = 1 << 30
 EIGHTH_TURN = 1 << 29
 
 
-@register_jitable
+@callee
 def check64(x: int) -> int:
     """x, which must fit int64."""
     return x
 
 
-@register_jitable
+@callee
 def check32(x: int) -> int:
     """x, which must fit int32."""
     return x
 
 
-@register_jitable
+@callee
 def wrap_bits(x: int, n: int) -> int:
     """The lowest n bits of x as a signed number: x modulo 2^n in [-2^(n-1), 2^(n-1)); 2 <= n <= 62."""
     return ((x + (1 << (n - 1))) & ((1 << n) - 1)) - (1 << (n - 1))
 
 
-@register_jitable
+@callee
 def wrap32(x: int) -> int:
     """x modulo 2^32 as int32: sums and differences of angles in bam."""
     return ((x + 0x80000000) & 0xFFFFFFFF) - 0x80000000
 
 
-@register_jitable
+@callee
 def clip(x: int, low: int, high: int) -> int:
     """x limited to [low, high]."""
     return low if x < low else (high if x > high else x)
 
 
-@register_jitable
+@callee
 def sat32(x: int) -> int:
     """x limited to int32."""
     return -2147483648 if x < -2147483648 else (2147483647 if x > 2147483647 else x)
 
 
-@register_jitable
+@callee
 def add_sat(a: int, b: int) -> int:
     """a + b limited to int32."""
     return sat32(check64(a + b))
 
 
-@register_jitable
+@callee
 def sub_sat(a: int, b: int) -> int:
     """a - b limited to int32."""
     return sat32(check64(a - b))
 
 
-@register_jitable
+@callee
 def shift_round(x: int, n: int) -> int:
     """x / 2^n, rounded to nearest, half up (arithmetic shift of x + 2^(n-1)); n <= 0: x * 2^-n."""
     if n > 0:
@@ -77,13 +79,13 @@ def shift_round(x: int, n: int) -> int:
     return check64(x << -n)
 
 
-@register_jitable
+@callee
 def mul_q(a: int, b: int, n: int) -> int:
     """a b / 2^n, rounded half up; the product must fit int64."""
     return shift_round(check64(a * b), n)
 
 
-@register_jitable
+@callee
 def mul_wide(a: int, b: int, n: int) -> int:
     """a b / 2^n for a 64-bit a and a 32-bit b, 1 <= n <= 62, the product up to 95 bits, the result in int64.
 
@@ -96,7 +98,7 @@ def mul_wide(a: int, b: int, n: int) -> int:
     return check64(check64(high << (32 - n)) + shift_round(low, n))
 
 
-@register_jitable
+@callee
 def div_trunc(a: int, b: int) -> int:
     """a / b towards zero, as in C; division by zero gives INT32_MAX with the sign of a, and 0 / 0 is 0."""
     if b == 0:
@@ -105,7 +107,7 @@ def div_trunc(a: int, b: int) -> int:
     return check64(quotient if (a < 0) == (b < 0) else -quotient)
 
 
-@register_jitable
+@callee
 def norm_shift(x: int) -> int:
     """s with 2^30 <= x * 2^s < 2^31 for x > 0 (s < 0: a right shift); 0 for x <= 0."""
     if x <= 0:
@@ -120,7 +122,7 @@ def norm_shift(x: int) -> int:
     return s
 
 
-@register_jitable
+@callee
 def sin_eighth(r: int) -> int:
     """sin, Q32, of r in bam, |r| <= 1/8 turn; Taylor polynomial of degree 11."""
     t = mul_q(r, 1686629713, 29)  # rad Q31
@@ -132,7 +134,7 @@ def sin_eighth(r: int) -> int:
     return shift_round(t, -1) + mul_q(mul_q(z, p, 32), t, 31)
 
 
-@register_jitable
+@callee
 def cos_eighth(r: int) -> int:
     """cos, Q32, of r in bam, |r| <= 1/8 turn; Taylor polynomial of degree 12."""
     t = mul_q(r, 1686629713, 29)
@@ -145,7 +147,7 @@ def cos_eighth(r: int) -> int:
     return 4294967296 + mul_q(z, p, 32)
 
 
-@register_jitable
+@callee
 def sin_q(angle: int) -> int:
     """sin, Q30, of an angle in bam (any multiple of a turn may be added); error at most 2^-30."""
     quarter = (wrap32(angle) + 536870912) >> 30  # nearest quarter turn, -2 .. 2
@@ -155,13 +157,13 @@ def sin_q(angle: int) -> int:
     return shift_round(s if q < 2 else -s, 2)
 
 
-@register_jitable
+@callee
 def cos_q(angle: int) -> int:
     """cos, Q30, of an angle in bam; error at most 2^-30."""
     return sin_q(angle + 1073741824)
 
 
-@register_jitable
+@callee
 def atan2_q(y: int, x: int) -> int:
     """atan2(y, x) in bam for int32 y and x; atan2_q(0, 0) = 0; error at most 2 bam (2^-28 rad).
 
@@ -191,8 +193,8 @@ def atan2_q(y: int, x: int) -> int:
     return wrap32(a if y >= 0 else -a)
 
 
-@register_jitable
-def keep32(x: int, state: list[int], flag: int) -> int:
+@callee
+def keep32(x: int, state: np.ndarray, flag: int) -> int:
     """x limited to int32; state[flag] becomes 1 if that changed it. For what must never wrap silently."""
     if x < -2147483648 or x > 2147483647:
         state[flag] = 1

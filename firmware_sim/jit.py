@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 from numba.core import config
+from numba.extending import register_jitable
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -28,6 +29,11 @@ def compile(function: Function) -> Function:
         return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
     finally:
         config.CACHE_DIR = before
+
+
+def callee(function: Function) -> Function:
+    """`function` itself, a plain Python function, which compiled code may call."""
+    return cast(Function, register_jitable(function))
 
 
 @cache

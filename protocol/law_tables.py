@@ -13,10 +13,23 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-INT32_MAX = 2**31 - 1
-NO_LIMIT = INT32_MAX  # of words whose maximum is infinite: no limit
-STATUS_BAD_WORD, STATUS_UNKNOWN_LAW, STATUS_MISSING = 1, 2, 4  # READY statuses, as in protocol.frames
-NO_INDEX = 0xFFFF
+from protocol.words import (
+    INT32_MAX,
+    NO_LIMIT,
+    STATUS_MISSING,
+    STATUS_UNKNOWN_LAW,
+    ConfigError,
+    Word,
+    dequantise,
+    lsb_of,
+    number_of,
+    quantise,
+    range_text,
+)
+
+# What belongs to a single word is read from here too.
+__all__ = ["INT32_MAX", "NO_LIMIT", "ConfigError", "Word", "dequantise", "lsb_of", "quantise"]
+
 FORM_FIXED, FORM_FLOAT = 0, 1
 REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
 DESIGN_PRINTED, DESIGN_REPAIRED = 0, 1
@@ -26,22 +39,8 @@ AXES = ("x", "y", "z")
 AUTOMATIC = -1.0  # default of a word with fractional bits: as many as the values that use it allow
 
 
-class Word(NamedTuple):
-    """One int32 word. `q`: fractional bits, or the word that holds them; `lsb`, if not 0, replaces 2^-q (user laws)."""
-
-    name: str
-    unit: str
-    q: int | str
-    minimum: float
-    maximum: float
-    default: float
-    about: str
-    choices: tuple[str, ...] = ()
-    lsb: float = 0.0
-
-
 class Variant(NamedTuple):
-    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ from the table's."""
+    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ."""
 
     transport_delays: tuple[int, ...]
     reference_leads: tuple[int, ...]
@@ -71,15 +70,6 @@ class LawTable(NamedTuple):
         if self.variant_word:
             return self.variants[int(params[self.variant_word])]
         return Variant(self.transport_delays, self.reference_leads)
-
-
-class ConfigError(ValueError):
-    """A word that cannot be used. `status` and `index` are READY's."""
-
-    def __init__(self, message: str, status: int = STATUS_BAD_WORD, index: int = NO_INDEX) -> None:
-        super().__init__(message)
-        self.status = status
-        self.index = index
 
 
 def _vector(name: str, unit: str, q: int | str, low: float, high: float, default: Sequence[float], about: str,
@@ -170,11 +160,7 @@ MRAC = LawTable(
         *_vector("printed_b1", "rad/(N m)", 30, -2, 2, (0.0586, 0.0411, 0.0404), "printed design: b1"),
     ),
     telemetry=(
-        *(
-            Word(f"{name}_{axis}", "", 28, -8, 8, 0, f"identified {name}, {axis}")
-            for axis in AXES
-            for name in _THETA
-        ),
+        *(Word(f"{name}_{axis}", "", 28, -8, 8, 0, f"identified {name}, {axis}") for axis in AXES for name in _THETA),
         *_vector("trace", "", 16, 0, 32768, (5, 5, 5), "trace of the covariance F"),
     ),
     transport_delays=(0, 1),
@@ -228,50 +214,6 @@ def user_table(name: str, params: Mapping[str, tuple[float, str, float]]) -> Law
         for key, (default, unit, lsb) in params.items()
     )
     return LawTable(USER_LAW_ID, 1, name, words, (), (0, 1, 2, 3, 4), (0.001, 60.0), (2, 1), READ_EULER)
-
-
-# -- numbers and words ------------------------------------------------------------------------------------------------
-
-
-def lsb_of(word: Word, words: Mapping[str, int]) -> float:
-    """Value of one count of `word`; `words` holds the word that `word.q` may name."""
-    if word.lsb:
-        return word.lsb
-    return math.ldexp(1.0, -(words[word.q] if isinstance(word.q, str) else word.q))
-
-
-def quantise(word: Word, value: float | str | bool, words: Mapping[str, int]) -> int:
-    """The int32 of `value`; raises ConfigError that names key, range and unit."""
-    number = _number(word, value)
-    if number == math.inf and word.maximum == math.inf:
-        return NO_LIMIT
-    if not word.minimum <= number <= word.maximum:
-        raise ConfigError(f"{word.name}: expected {_range(word)}, got {value}")
-    count = round(number / lsb_of(word, words))
-    if not -INT32_MAX - 1 <= count <= INT32_MAX:
-        raise ConfigError(f"{word.name}: {value} {word.unit} does not fit 32 bits of {lsb_of(word, words)} each")
-    return count
-
-
-def dequantise(word: Word, count: int, words: Mapping[str, int]) -> float:
-    """The value of a word; the inverse of quantise() up to half an LSB."""
-    if count == NO_LIMIT and word.maximum == math.inf:
-        return math.inf
-    return count * lsb_of(word, words)
-
-
-def _number(word: Word, value: float | str | bool) -> float:
-    if isinstance(value, str):
-        if value not in word.choices:
-            raise ConfigError(f"{word.name}: expected {_range(word)}, got {value!r}")
-        return float(word.choices.index(value))
-    return float(value)
-
-
-def _range(word: Word) -> str:
-    if word.choices:
-        return "one of " + ", ".join(word.choices)
-    return f"{word.minimum:g} to {word.maximum:g} {word.unit}".rstrip()
 
 
 # -- whole configurations ---------------------------------------------------------------------------------------------
@@ -345,13 +287,13 @@ def _unknown(table: LawTable, name: str) -> str:
 
 
 def _defaults(table: LawTable, flat: Mapping[str, float | str | bool]) -> dict[str, float]:
-    return {word.name: _number(word, flat.get(word.name, word.default)) for word in table.params}
+    return {word.name: number_of(word, flat.get(word.name, word.default)) for word in table.params}
 
 
 def _automatic_bits(table: LawTable, bits: Word, flat: Mapping[str, float | str | bool]) -> float:
     """The most fractional bits with which every word that uses them still fits int32."""
     users = [word for word in (*COMMON, *table.params) if word.q == bits.name]
-    peak = max(abs(_number(word, flat.get(word.name, word.default))) for word in users)
+    peak = max(abs(number_of(word, flat.get(word.name, word.default))) for word in users)
     best = int(bits.maximum)
     while best > bits.minimum and peak * 2.0**best > INT32_MAX:
         best -= 1
@@ -375,9 +317,7 @@ def parse_configuration(words: Sequence[int], user: LawTable | None = None) -> C
     both = common | params
     values = {word.name: dequantise(word, both[word.name], both) for word in (*COMMON, *table.params)}
     _check_ranges(table, values)
-    return Configuration(
-        table, tuple(words), common, params, values, _rows(words, law_end), table_hash(table, words)
-    )
+    return Configuration(table, tuple(words), common, params, values, _rows(words, law_end), table_hash(table, words))
 
 
 def _named(table: Sequence[Word], words: Sequence[int], start: int) -> dict[str, int]:
@@ -392,7 +332,8 @@ def _table_of(law_id: int, version: int, user: LawTable | None) -> LawTable:
     table = LAWS.get((law_id, version))
     if table is None:
         known = ", ".join(f"{i} version {v} ({t.name})" for (i, v), t in sorted(LAWS.items()))
-        raise ConfigError(f"CONFIG: law id {law_id} version {version} is unknown; known: {known}", STATUS_UNKNOWN_LAW, 0)
+        message = f"CONFIG: law id {law_id} version {version} is unknown; known: {known}"
+        raise ConfigError(message, STATUS_UNKNOWN_LAW, 0)
     return table
 
 
@@ -401,11 +342,11 @@ def _check_ranges(table: LawTable, values: Mapping[str, float]) -> None:
         slack = 0.0 if word.q == 0 and not word.lsb else 1e-9 * (1.0 + abs(word.minimum))  # half an LSB of rounding
         value = values[word.name]
         if not word.minimum - slack <= value <= word.maximum + slack:
-            raise ConfigError(f"{word.name}: expected {_range(word)}, got {value:g}", index=index)
+            raise ConfigError(f"{word.name}: expected {range_text(word)}, got {value:g}", index=index)
 
 
 def _rows(words: Sequence[int], start: int) -> tuple[tuple[int, int, int, int], ...]:
-    rows = []
+    rows: list[tuple[int, int, int, int]] = []
     for i in range(start, len(words), ROW_WORDS):
         tick, x, y, z = (int(n) for n in words[i : i + ROW_WORDS])
         if tick < 0 or (rows and tick <= rows[-1][0]):

@@ -7,8 +7,7 @@ FWD, INV: kinematics.py; Gamma: gyroscopic torque at the same instant, 0 without
     1 observe   alpha = FWD(y^, v^, (u(k-1) - Gamma) T_s^2 / I) + w^; y^ += v^ + alpha/2; v^ += alpha
                 e = y(k) - y^;  y^ += L1 e; v^ += L2 e; w^ += L3 e          (skipped without a reading)
     2 adapt     z = y(k) - 2 y(k-1) + y(k-2);  x = INV(y^(k-1), v^(k-1), z);  c = (u(k-1) + u(k-2)) T_s^2 / (2 I0)
-                both through two lowpasses (pole 0.8), minus a slow lowpass (pole 0.97); then, if |c| > 1e-4,
-                P = min(P + 1e-6, 0.1); G = P c / (1e-7 + c^2 P); g += G (x - c g); P -= G c P; 0.6 <= g <= 1.7
+                both filtered; g from x = c g by recursive least squares                                 (gain.py)
     3 predict   y', v' for t_(k+1) as in 1 with u(k)
     4 place     nu = am - K1 (y' - ym(k+1)) - K2 (v' - vm(k+1)) - w^;  command = clip(I INV(y', v', nu) / T_s^2 + Gamma)
     Gamma       gyroscopic.py; h = wheel momentum as reported, without a SAMPLE propagated by -u T_s
@@ -23,22 +22,32 @@ Source: study of paper 004, section 3.1 (there: BEST). Transport delay: exactly 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from firmware_sim import jit
 from firmware_sim.controllers.compiled import CompiledLaw, Field, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.gain import (
+    learn_fixed,
+    learn_float,
+    second_differences_fixed,
+    second_differences_float,
+    washed_fixed,
+    washed_float,
+)
 from firmware_sim.controllers.gyroscopic import gyro_fixed, gyro_float
 from firmware_sim.controllers.kinematics import (
-    demand_fixed,
-    drive_fixed,
+    IntTriple,
+    Triple,
     forward_fixed,
     forward_float,
     inverse_fixed,
     inverse_float,
+    torque_scales_fixed,
+    triple,
 )
-from firmware_sim.fixed import INV_TWO_PI_Q34, add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
+from firmware_sim.fixed import add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
 from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_fixed, restart_float, wrap_pi
 from protocol.law_tables import APPC, AXES, Configuration
 
@@ -68,22 +77,15 @@ STATE = (
 # Parameters of both forms; fixed: Q30, torque Q28, DRIVE_* and DEMAND_* mantissas and shifts (kinematics.py).
 TS, TS_INV, K1, K2, L1, L2, L3, ADAPT, GYRO, ORBIT, TORQUE_SHIFT, MOMENTUM_SHIFT = range(12)
 LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT = 12, 15, 18, 21, 24
-PARAMETERS = 27
 
 START_STEPS = 4
 LEARN_FROM = 25
 STEPS_MAX = 1000000
 
 
-@register_jitable
-def _triple(s: np.ndarray, first: int) -> tuple[float, float, float]:
-    return s[first], s[first + 1], s[first + 2]
-
-
 # -- float reference ---------------------------------------------------------------------------------------------------
 
 
-@register_jitable
 def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick; par TORQUE_OF = I0 / T_s^2, DRIVE_OF = T_s^2 / I0."""
     out[0], out[1], out[2], out[3], s[RESTARTED] = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -91,7 +93,7 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     if s[STEPS] == 0.0 and not fresh:
         out[3] = 32.0
         return
-    angles, rates = _triple(s, Y), _triple(s, V)
+    angles, rates = triple(s, Y), triple(s, V)
     if s[STEPS] > 0.0:
         _propagate_float(s, par)
     if fresh:
@@ -118,13 +120,13 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     s[STEPS] = min(s[STEPS] + 1.0, 1e6)
 
 
-@register_jitable
-def _acceleration_float(s: np.ndarray, par: np.ndarray) -> tuple[float, float, float]:
+@jit.callee
+def _acceleration_float(s: np.ndarray, par: np.ndarray) -> Triple:
     """alpha at (y^, v^) with the torque that acts now."""
-    angles, rates = _triple(s, Y), _triple(s, V)
+    angles, rates = triple(s, Y), triple(s, V)
     gyro = (0.0, 0.0, 0.0)
     if par[GYRO] != 0.0:
-        gyro = gyro_float(_inertia_float(s, par), par[TS], par[ORBIT], angles, rates, _triple(s, H))
+        gyro = gyro_float(_inertia_float(s, par), par[TS], par[ORBIT], angles, rates, triple(s, H))
     x = (s[APPLIED] - gyro[0]) * s[G] * par[DRIVE_OF]
     y = (s[APPLIED + 1] - gyro[1]) * s[G + 1] * par[DRIVE_OF + 1]
     z = (s[APPLIED + 2] - gyro[2]) * s[G + 2] * par[DRIVE_OF + 2]
@@ -132,13 +134,13 @@ def _acceleration_float(s: np.ndarray, par: np.ndarray) -> tuple[float, float, f
     return a[0] + s[W], a[1] + s[W + 1], a[2] + s[W + 2]
 
 
-@register_jitable
-def _inertia_float(s: np.ndarray, par: np.ndarray) -> tuple[float, float, float]:
+@jit.callee
+def _inertia_float(s: np.ndarray, par: np.ndarray) -> Triple:
     """I / T_s^2."""
     return par[TORQUE_OF] / s[G], par[TORQUE_OF + 1] / s[G + 1], par[TORQUE_OF + 2] / s[G + 2]
 
 
-@register_jitable
+@jit.callee
 def _propagate_float(s: np.ndarray, par: np.ndarray) -> None:
     alpha = _acceleration_float(s, par)
     for i in range(3):
@@ -148,7 +150,7 @@ def _propagate_float(s: np.ndarray, par: np.ndarray) -> None:
         s[INNOVATION + i] = 0.0
 
 
-@register_jitable
+@jit.callee
 def _correct_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
     for i in range(3):
         if s[STEPS] == 0.0:
@@ -161,33 +163,18 @@ def _correct_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
         s[H + i] = inp[16 + i]
 
 
-@register_jitable
-def _adapt_float(
-    s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: tuple[float, float, float], rates: tuple[float, float, float]
-) -> None:
-    z0 = wrap_pi(inp[3] - s[READING]) - wrap_pi(s[READING] - s[READING_BEFORE])
-    z1 = wrap_pi(inp[4] - s[READING + 1]) - wrap_pi(s[READING + 1] - s[READING_BEFORE + 1])
-    z2 = wrap_pi(inp[5] - s[READING + 2]) - wrap_pi(s[READING + 2] - s[READING_BEFORE + 2])
-    response = inverse_float(angles, rates, (z0, z1, z2))
+@jit.callee
+def _adapt_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: Triple, rates: Triple) -> None:
+    z = second_differences_float(triple(inp, 3), triple(s, READING), triple(s, READING_BEFORE))
+    response = inverse_float(angles, rates, z)
     for i in range(3):
-        x = _washed_float(s, RESPONSE, i, response[i])
-        c = _washed_float(s, DRIVE, i, 0.5 * (s[APPLIED + i] + s[BEFORE + i]) * par[DRIVE_OF + i])
-        if abs(c) > 1e-4 and s[STEPS] >= LEARN_FROM:
-            p = min(s[P + i] + 1e-6, 0.1)
-            gain = p * c / (1e-7 + c * c * p)
-            s[G + i] = min(max(s[G + i] + gain * (x - c * s[G + i]), 0.6), 1.7)
-            s[P + i] = p - gain * c * p
+        x = washed_float(s, RESPONSE, i, response[i])
+        c = washed_float(s, DRIVE, i, 0.5 * (s[APPLIED + i] + s[BEFORE + i]) * par[DRIVE_OF + i])
+        if s[STEPS] >= LEARN_FROM:
+            s[G + i], s[P + i] = learn_float(s[G + i], s[P + i], x, c)
 
 
-@register_jitable
-def _washed_float(s: np.ndarray, base: int, i: int, x: float) -> float:
-    s[base + 3 * i] += 0.2 * (x - s[base + 3 * i])
-    s[base + 3 * i + 1] += 0.2 * (s[base + 3 * i] - s[base + 3 * i + 1])
-    s[base + 3 * i + 2] += 0.03 * (s[base + 3 * i + 1] - s[base + 3 * i + 2])
-    return s[base + 3 * i + 1] - s[base + 3 * i + 2]
-
-
-@register_jitable
+@jit.callee
 def _place_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     alpha = _acceleration_float(s, par)
     angles = (s[Y] + s[V] + 0.5 * alpha[0], s[Y + 1] + s[V + 1] + 0.5 * alpha[1], s[Y + 2] + s[V + 2] + 0.5 * alpha[2])
@@ -195,7 +182,7 @@ def _place_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarra
     for i in range(3):
         e = wrap_pi(angles[i] - ref[NEXT + i])
         out[i] = ref[ACCEL + i] - par[K1] * e - par[K2] * (rates[i] - ref[RATE_NEXT + i]) - s[W + i]
-    body, inertia = inverse_float(angles, rates, _triple(out, 0)), _inertia_float(s, par)
+    body, inertia = inverse_float(angles, rates, triple(out, 0)), _inertia_float(s, par)
     gyro = (0.0, 0.0, 0.0)
     if par[GYRO] != 0.0:
         ts = par[TS]
@@ -214,7 +201,6 @@ def _place_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarra
 # -- fixed form --------------------------------------------------------------------------------------------------------
 
 
-@register_jitable
 def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick, in integers."""
     out[0], out[1], out[2], out[3], s[RESTARTED], s[ARITHMETIC] = 0, 0, 0, 0, 0, 0
@@ -222,7 +208,7 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     if s[STEPS] == 0 and not fresh:
         out[3] = 32
         return
-    angles, rates = _triple(s, Y), _triple(s, V)
+    angles, rates = triple(s, Y), triple(s, V)
     if s[STEPS] > 0:
         _propagate_fixed(s, par)
     if fresh:
@@ -252,34 +238,32 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     s[STEPS] = min(s[STEPS] + 1, STEPS_MAX)
 
 
-@register_jitable
+@jit.callee
 def _drive_fixed(par: np.ndarray, i: int, torque: int) -> int:
     """Acceleration, turn36, of a torque Q28 on the inertia I0."""
     return sat32(mul_q(torque, par[DRIVE_OF + i], par[DRIVE_SHIFT + i]))
 
 
-@register_jitable
-def _scale_fixed(s: np.ndarray, par: np.ndarray) -> tuple[int, int, int]:
+@jit.callee
+def _scale_fixed(s: np.ndarray, par: np.ndarray) -> IntTriple:
     """Per axis, torque Q28 of the inertia I0 / g = acceleration (turn36) times this 2^-DEMAND_SHIFT."""
     x, y = mul_q(par[TORQUE_OF], s[G_INV], 28), mul_q(par[TORQUE_OF + 1], s[G_INV + 1], 28)
     return x, y, mul_q(par[TORQUE_OF + 2], s[G_INV + 2], 28)
 
 
-@register_jitable
-def _gyro_fixed(
-    s: np.ndarray, par: np.ndarray, angles: tuple[int, int, int], rates: tuple[int, int, int], h: tuple[int, int, int]
-) -> tuple[int, int, int]:
-    shift = _triple(par, DEMAND_SHIFT)
+@jit.callee
+def _gyro_fixed(s: np.ndarray, par: np.ndarray, angles: IntTriple, rates: IntTriple, h: IntTriple) -> IntTriple:
+    shift = triple(par, DEMAND_SHIFT)
     return gyro_fixed(_scale_fixed(s, par), shift, par[TS], par[TS_INV], par[ORBIT], angles, rates, h)
 
 
-@register_jitable
-def _acceleration_fixed(s: np.ndarray, par: np.ndarray) -> tuple[int, int, int]:
+@jit.callee
+def _acceleration_fixed(s: np.ndarray, par: np.ndarray) -> IntTriple:
     """alpha at (y^, v^) with the torque that acts now, turn36."""
-    angles, rates = _triple(s, Y), _triple(s, V)
+    angles, rates = triple(s, Y), triple(s, V)
     gyro = (0, 0, 0)
     if par[GYRO] != 0:
-        gyro = _gyro_fixed(s, par, angles, rates, _triple(s, H))
+        gyro = _gyro_fixed(s, par, angles, rates, triple(s, H))
     x = sat32(mul_q(_drive_fixed(par, 0, sub_sat(s[APPLIED], gyro[0])), s[G], 28))
     y = sat32(mul_q(_drive_fixed(par, 1, sub_sat(s[APPLIED + 1], gyro[1])), s[G + 1], 28))
     z = sat32(mul_q(_drive_fixed(par, 2, sub_sat(s[APPLIED + 2], gyro[2])), s[G + 2], 28))
@@ -287,13 +271,13 @@ def _acceleration_fixed(s: np.ndarray, par: np.ndarray) -> tuple[int, int, int]:
     return add_sat(a[0], s[W]), add_sat(a[1], s[W + 1]), add_sat(a[2], s[W + 2])
 
 
-@register_jitable
+@jit.callee
 def _moved_fixed(y: int, v: int, alpha: int) -> int:
     """y + v + alpha / 2: bam and turn36 to bam."""
     return wrap32(y + shift_round(shift_round(v, -1) + alpha, 5))
 
 
-@register_jitable
+@jit.callee
 def _propagate_fixed(s: np.ndarray, par: np.ndarray) -> None:
     alpha = _acceleration_fixed(s, par)
     for i in range(3):
@@ -303,7 +287,7 @@ def _propagate_fixed(s: np.ndarray, par: np.ndarray) -> None:
         s[INNOVATION + i] = 0
 
 
-@register_jitable
+@jit.callee
 def _correct_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
     for i in range(3):
         if s[STEPS] == 0:
@@ -316,54 +300,20 @@ def _correct_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
         s[H + i] = keep32(shift_round(inp[16 + i], par[MOMENTUM_SHIFT]), s, ARITHMETIC)
 
 
-@register_jitable
-def _second_difference_fixed(s: np.ndarray, inp: np.ndarray, i: int) -> int:
-    """z, turn36."""
-    z = wrap32(inp[3 + i] - s[READING + i]) - wrap32(s[READING + i] - s[READING_BEFORE + i])
-    return sat32(shift_round(z, -4))
-
-
-@register_jitable
-def _adapt_fixed(
-    s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: tuple[int, int, int], rates: tuple[int, int, int]
-) -> None:
-    z0, z1, z2 = (
-        _second_difference_fixed(s, inp, 0),
-        _second_difference_fixed(s, inp, 1),
-        _second_difference_fixed(s, inp, 2),
-    )
-    response = inverse_fixed(angles, rates, (z0, z1, z2))
+@jit.callee
+def _adapt_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: IntTriple, rates: IntTriple) -> None:
+    z = second_differences_fixed(triple(inp, 3), triple(s, READING), triple(s, READING_BEFORE))
+    response = inverse_fixed(angles, rates, z)
     for i in range(3):
         drive = _drive_fixed(par, i, s[APPLIED + i]) + _drive_fixed(par, i, s[BEFORE + i])
-        x = _washed_fixed(s, RESPONSE, i, response[i])
-        c = _washed_fixed(s, DRIVE, i, shift_round(drive, 1))
-        if abs(c) > 3435974 and s[STEPS] >= LEARN_FROM:  # 1e-4 rad
-            _learn_fixed(s, i, x, c)
+        x = washed_fixed(s, RESPONSE, i, response[i])
+        c = washed_fixed(s, DRIVE, i, shift_round(drive, 1))
+        if s[STEPS] >= LEARN_FROM:
+            s[G + i], s[P + i] = learn_fixed(s[G + i], s[P + i], x, c)
+            s[G_INV + i] = div_trunc(1 << 56, s[G + i])
 
 
-@register_jitable
-def _washed_fixed(s: np.ndarray, base: int, i: int, x: int) -> int:
-    """Two lowpasses, minus a slow one: turn36 in, rad Q35 out. 0.2 and 0.03 in Q30."""
-    s[base + 3 * i] = sat32(s[base + 3 * i] + mul_q(x - s[base + 3 * i], 214748365, 30))
-    s[base + 3 * i + 1] = sat32(s[base + 3 * i + 1] + mul_q(s[base + 3 * i] - s[base + 3 * i + 1], 214748365, 30))
-    s[base + 3 * i + 2] = sat32(s[base + 3 * i + 2] + mul_q(s[base + 3 * i + 1] - s[base + 3 * i + 2], 32212255, 30))
-    return sat32(mul_q(sub_sat(s[base + 3 * i + 1], s[base + 3 * i + 2]), 843314857, 28))
-
-
-@register_jitable
-def _learn_fixed(s: np.ndarray, i: int, x: int, c: int) -> None:
-    """The scalar identification: x, c rad Q35; P Q34, P c Q44, denominator Q50, G Q20, g Q28."""
-    p = min(s[P + i] + 17180, 1717986918)
-    pc = mul_q(p, c, 25)
-    denominator = 112589991 + mul_q(shift_round(pc, 7), c, 22)  # Q37 times Q35
-    gain = sat32(div_trunc(shift_round(pc, -26), denominator))
-    error = sat32(x - mul_q(c, s[G + i], 28))
-    s[G + i] = clip(s[G + i] + mul_q(gain, error, 27), 161061274, 456340275)
-    s[G_INV + i] = div_trunc(1 << 56, s[G + i])
-    s[P + i] = clip(p - mul_q(sat32(mul_q(gain, c, 25)), p, 30), 0, 1717986918)
-
-
-@register_jitable
+@jit.callee
 def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     alpha = _acceleration_fixed(s, par)
     angles = (
@@ -376,7 +326,7 @@ def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarra
         e = mul_q(par[K1], wrap32(angles[i] - ref[NEXT + i]), 26)
         f = mul_q(par[K2], sub_sat(rates[i], ref[RATE_NEXT + i]), 30)
         out[i] = keep32(ref[ACCEL + i] - e - f - s[W + i], s, ARITHMETIC)
-    body, scale = inverse_fixed(angles, rates, _triple(out, 0)), _scale_fixed(s, par)
+    body, scale = inverse_fixed(angles, rates, triple(out, 0)), _scale_fixed(s, par)
     gyro = (0, 0, 0)
     if par[GYRO] != 0:
         hx = sat32(s[H] - mul_q(s[APPLIED], par[TS], 30))
@@ -393,17 +343,7 @@ def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarra
     out[3] += saturated
 
 
-# -- the law as the board sees it ----------------------------------------------------------------------------------------
-
-
-@jit.compile
-def _run_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_float(s, par, inp, ref, out)
-
-
-@jit.compile
-def _run_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_fixed(s, par, inp, ref, out)
+# -- the law as the board sees it --------------------------------------------------------------------------------------
 
 
 class Appc(CompiledLaw):
@@ -411,7 +351,7 @@ class Appc(CompiledLaw):
 
     STATE = STATE
     functions = (step_float, step_fixed)
-    compiled = (_run_float, _run_fixed)
+    compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
     @property
     def reference_restarted(self) -> bool:
@@ -430,7 +370,7 @@ class Appc(CompiledLaw):
         inertia = configuration.vector("inertia_kgm2")
         par = [ts, 1 / ts, *gains, v["adapt"], v["gyro"], v["orbit_rate_radps"] * ts, 0.0, 0.0]
         par += [*configuration.vector("torque_limit"), *(i / ts**2 for i in inertia), *(ts**2 / i for i in inertia)]
-        return par + [0.0] * (PARAMETERS - len(par))
+        return par + [0.0] * 6
 
     @staticmethod
     def fixed_par(configuration: Configuration) -> list[int]:
@@ -441,16 +381,13 @@ class Appc(CompiledLaw):
         qo2, po3 = mul_q(qo, qo, 30), mul_q(mul_q(p["observer_pole"], p["observer_pole"], 30), p["observer_pole"], 30)
         l2 = mul_q(mul_q(qo2, one + p["observer_pole"], 30), 3, 1)
         gains = [mul_q(qc, qc, 30), mul_q(qc, pc + 3 * one, 31), one - po3, l2, mul_q(qo2, qo, 30)]
-        orbit = mul_q(mul_q(p["orbit_rate_radps"], ts, 32), INV_TWO_PI_Q34, 34)
+        orbit = mul_q(mul_q(p["orbit_rate_radps"], ts, 32), 2734261102, 34)
         shifts = [common["torque_bits"] - 28, common["momentum_bits"] - 28]
-        drive = [drive_fixed(period_us, p[f"inertia_kgm2_{axis}"]) for axis in AXES]
-        demand = [demand_fixed(m, n) for m, n in drive]
-        par = [ts, ts_inv, *gains, p["adapt"], p["gyro"], orbit, *shifts, *torque_limits_fixed(common)]
-        par += [m for m, _ in demand] + [m for m, _ in drive] + [n for _, n in demand]
-        return par + [n for _, n in drive]
+        scales = torque_scales_fixed(period_us, [p[f"inertia_kgm2_{axis}"] for axis in AXES])
+        return [ts, ts_inv, *gains, p["adapt"], p["gyro"], orbit, *shifts, *torque_limits_fixed(common), *scales]
 
     def telemetry(self) -> list[int]:
-        s = self.state.tolist()
+        s: list[Any] = self.state.tolist()
         fields = (G, P, INNOVATION, W)
         if self.is_float:
             lsb = (2.0**-28, 2.0**-34, 2 * math.pi / 2**32, 2 * math.pi / 2**36)

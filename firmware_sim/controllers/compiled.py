@@ -19,10 +19,10 @@ class LawRefuses(ValueError):
 
 
 class Field(NamedTuple):
-    """One field of a law's state: `count` numbers with `q` fractional bits of `unit`, `width` bits each (fixed form)."""
+    """One field of a law's state: `length` numbers; fixed form: `q` fractional bits of `unit`, `width` bits each."""
 
     name: str
-    count: int
+    length: int
     unit: str
     q: int
     width: int = 32
@@ -32,13 +32,13 @@ def offsets(fields: Sequence[Field]) -> tuple[int, ...]:
     """Index of each field's first number."""
     starts = [0]
     for field in fields:
-        starts.append(starts[-1] + field.count)
+        starts.append(starts[-1] + field.length)
     return tuple(starts[:-1])
 
 
 def size(fields: Sequence[Field]) -> int:
     """Length of the state array."""
-    return sum(field.count for field in fields)
+    return sum(field.length for field in fields)
 
 
 class CompiledLaw:
@@ -96,14 +96,14 @@ class CompiledLaw:
         """A view of one field of the state, in the form's own units."""
         index = [field.name for field in self.STATE].index(name)
         start = offsets(self.STATE)[index]
-        return self.state[start : start + self.STATE[index].count]
+        return self.state[start : start + self.STATE[index].length]
 
 
 def word_of(value: float, lsb: float) -> int:
     """A float as an int32 telemetry word, limited; not a number becomes the lowest int32."""
     if value != value:
         return INT32_MIN
-    return int(round(min(max(value / lsb, INT32_MIN), INT32_MAX)))
+    return round(min(max(value / lsb, INT32_MIN), INT32_MAX))
 
 
 def limited(words: Sequence[int], table: Sequence[Word]) -> list[int]:

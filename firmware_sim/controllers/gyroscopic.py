@@ -1,4 +1,4 @@
-"""Gyroscopic torque of a satellite with wheels, as the laws compensate it: both terms of the Euler equation, or neither.
+"""Gyroscopic torque of a satellite with wheels, as a law compensates it: both terms of the Euler equation, or neither.
 
     Gamma = w x (I w + h) - I (Omega x w_O),  w = Omega + w_O,  w_O = C_BO [0, -w0, 0]
 
@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 
-from numba.extending import register_jitable
-
 from firmware_sim.controllers.kinematics import IntTriple, Triple, rad_fixed
 from firmware_sim.fixed import add_sat, cos_q, mul_q, sat32, sin_q
+from firmware_sim.jit import callee
 
 
-@register_jitable
+@callee
 def gyro_float(inertia: Triple, ts: float, orbit: float, angles: Triple, rates: Triple, h: Triple) -> Triple:
     """Gamma, N m; inertia / T_s^2, T_s in s, w0 in rad/sample, angles rad, Euler rates rad/sample, h N m s."""
     om, wo = body_float(angles, rates), orbit_float(angles, orbit)
@@ -29,14 +28,14 @@ def gyro_float(inertia: Triple, ts: float, orbit: float, angles: Triple, rates: 
     return x, y, z
 
 
-@register_jitable
+@callee
 def body_float(angles: Triple, v: Triple) -> Triple:
     """Body rate, rad/sample, of the Euler rates v."""
     sf, cf, st, ct = math.sin(angles[0]), math.cos(angles[0]), math.sin(angles[1]), math.cos(angles[1])
     return v[0] - v[2] * st, v[1] * cf + v[2] * sf * ct, v[2] * cf * ct - v[1] * sf
 
 
-@register_jitable
+@callee
 def orbit_float(angles: Triple, rate: float) -> Triple:
     """Rate of the orbital frame in body axes, C_BO [0, -rate, 0]."""
     sf, cf, st = math.sin(angles[0]), math.cos(angles[0]), math.sin(angles[1])
@@ -44,9 +43,16 @@ def orbit_float(angles: Triple, rate: float) -> Triple:
     return -rate * ct * sp, -rate * (sf * st * sp + cf * cp), -rate * (cf * st * sp - sf * cp)
 
 
-@register_jitable
+@callee
 def gyro_fixed(
-    scale: IntTriple, shift: IntTriple, ts: int, ts_inv: int, orbit: int, angles: IntTriple, rates: IntTriple, h: IntTriple
+    scale: IntTriple,
+    shift: IntTriple,
+    ts: int,
+    ts_inv: int,
+    orbit: int,
+    angles: IntTriple,
+    rates: IntTriple,
+    h: IntTriple,
 ) -> IntTriple:
     """Gamma, N m Q28; torque = acceleration scale 2^-shift; T_s Q30, 1/T_s Q28, w0 turn36, h Q28."""
     om, wo = body_fixed(angles, rates), orbit_fixed(angles, orbit)
@@ -64,7 +70,7 @@ def gyro_fixed(
     return sat32(x), sat32(y), sat32(z)
 
 
-@register_jitable
+@callee
 def body_fixed(angles: IntTriple, v: IntTriple) -> IntTriple:
     """Body rate, turn36, of the Euler rates v, turn36."""
     sf, cf, st, ct = sin_q(angles[0]), cos_q(angles[0]), sin_q(angles[1]), cos_q(angles[1])
@@ -74,7 +80,7 @@ def body_fixed(angles: IntTriple, v: IntTriple) -> IntTriple:
     return sat32(v[0] - mul_q(v[2], st, 30)), y, z
 
 
-@register_jitable
+@callee
 def orbit_fixed(angles: IntTriple, rate: int) -> IntTriple:
     """Rate of the orbital frame in body axes, turn36; rate turn36."""
     sf, cf, st = sin_q(angles[0]), cos_q(angles[0]), sin_q(angles[1])

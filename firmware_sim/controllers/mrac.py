@@ -1,10 +1,9 @@
-"""mrac: the unified law of Landau and Lozano with recursive least squares, per axis, as printed (d = 1) or repaired (d = 2).
+"""mrac: the unified law of Landau and Lozano with least squares, per axis, as printed (d = 1) or repaired (d = 2).
 
 Model y(k) = phi theta, theta = [a1 a2 b0 b1 d]; v(k): input that acts from t_k on; C2 = 1 + c1 q^-1 + c2 q^-2 =
 (1 - c2_pole q^-1)^2; ym: reference with lead d. Measured y are unwrapped, ym is taken next to y. At tick k:
 
-    identify    phi = [-y(k-1) -y(k-2) v(k-1) v(k-2) 1];  e = y(k) - phi theta;  G = F phi / (l + phi' F phi)
-                theta += G e;  F = (F - G phi' F) / l;  l = forgetting, but 1 while trace F >= trace_max;  b0 is limited
+    identify    phi = [-y(k-1) -y(k-2) v(k-1) v(k-2) 1];  e = y(k) - phi theta;  rls.py;  b0 is limited
     printed     u = [C2 ym(k+1) - t0 y(k) - t1 y(k-1) - b1 u(k-1) - d] / b0,  t0 = c1 - a1,  t1 = c2 - a2
                 and phi has u(k-1), u(k-2), the law's own commands: it takes them for what acted
     repaired    u = [C2 ym(k+2) - t0 y(k) - t1 y(k-1) - (b1c + b0c s1) v(k) - b1c s1 v(k-1) - (1 + s1) d] / b0c
@@ -13,31 +12,40 @@ Model y(k) = phi theta, theta = [a1 a2 b0 b1 d]; v(k): input that acts from t_k 
     decouple    u is taken for I0 times an Euler acceleration; command = I0 INV(eta, rate, u / I0), eta = (ym(k+1) +
                 ym(k+2))/2, rate = ym(k+2) - ym(k+1); all three are scaled when one is at its limit; v = I0 FWD(applied)
 
-Without a reading y(k) = phi theta, nothing is identified. theta starts at [-2 1 b b 0], b = T_s^2 / (2 I0), with b0 kept in
-[b/2, 2b]; printed: b0, b1 as printed, b0 >= 0.01. Identification starts at the fourth tick (all of phi measured) and
-after a loss with the third reading in a row.
+Without a reading y(k) = phi theta, and nothing is identified. theta starts at [-2 1 b b 0], b = T_s^2 / (2 I0), with b0
+kept in [b/2, 2b]; printed: b0, b1 as printed, b0 >= 0.01. Identification starts at the fourth tick (then all of phi is
+measured) and after a loss with the third reading in a row.
 Fixed form: y rad Q28 (limited to +-8 rad), u, theta, G Q28, F Q20, F phi Q40.
-Source: paper 004, eqs. of the unified method; study of paper 004, sections 1, 3.2 and 4 (there: MIN, MID). Euler angles.
+Source: paper 004, eqs. of the unified method; study of paper 004, sections 1, 3.2 and 4 (there: MIN, MID).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, LawRefuses, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.compiled import (
+    CompiledLaw,
+    Field,
+    LawRefuses,
+    limited,
+    offsets,
+    torque_limits_fixed,
+    word_of,
+)
 from firmware_sim.controllers.kinematics import (
-    demand_fixed,
-    drive_fixed,
     forward_fixed,
     forward_float,
     inverse_fixed,
     inverse_float,
+    torque_scales_fixed,
+    triple,
 )
-from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, mul_wide, sat32, shift_round, wrap32
+from firmware_sim.controllers.rls import identify_fixed, identify_float
+from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import AHEAD, NEXT, NOW, PAST
 from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, NO_LIMIT, Configuration
 
@@ -69,15 +77,9 @@ STEPS_MAX = 1000000
 TURN = 2.0 * math.pi
 
 
-@register_jitable
-def _triple(s: np.ndarray, first: int) -> tuple[float, float, float]:
-    return s[first], s[first + 1], s[first + 2]
-
-
 # -- float reference ---------------------------------------------------------------------------------------------------
 
 
-@register_jitable
 def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick; par TORQUE_OF = I0 / T_s^2, DRIVE_OF = T_s^2 / I0."""
     out[0], out[1], out[2], out[3] = 0.0, 0.0, 0.0, 0.0
@@ -95,7 +97,8 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         model = _predict_float(s, par, i)
         y = _near_float(inp[3 + i], s[Y + i]) if fresh else model
         if par[IDENTIFY] != 0.0 and learn:
-            _identify_float(s, par, i, y - model)
+            identify_float(s, THETA + 5 * i, F + 25 * i, PHI, par[FORGETTING], par[TRACE_MAX], y - model)
+            s[THETA + 5 * i + 2] = min(max(s[THETA + 5 * i + 2], par[B0_MIN + i]), par[B0_MAX + i])
         s[Y_BEFORE + i], s[Y + i] = s[Y + i], y
         out[i] = _control_float(s, par, ref, i)
     saturated = 0.0
@@ -110,26 +113,26 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     s[STEPS] = min(s[STEPS] + 1.0, 1e6)
 
 
-@register_jitable
+@jit.callee
 def _near_float(angle: float, centre: float) -> float:
     """angle plus the whole turns that bring it within half a turn of centre."""
     return angle + TURN * math.floor((centre - angle) / TURN + 0.5)
 
 
-@register_jitable
+@jit.callee
 def _take_inputs_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
     """v(k), v(k-1), v(k-2); printed: u(k-1), u(k-2), u(k-3)."""
     known = par[PRINTED] == 0.0 and inp[2] != 0.0
-    v = _triple(inp, 13) if known else _triple(s, COMMAND)
+    v = triple(inp, 13) if known else triple(s, COMMAND)
     if par[DECOUPLE] != 0.0:
         b = (v[0] * par[DRIVE_OF], v[1] * par[DRIVE_OF + 1], v[2] * par[DRIVE_OF + 2])
-        a = forward_float(_triple(s, ETA), _triple(s, RATE), b)
+        a = forward_float(triple(s, ETA), triple(s, RATE), b)
         v = (a[0] * par[TORQUE_OF], a[1] * par[TORQUE_OF + 1], a[2] * par[TORQUE_OF + 2])
     for i in range(3):
         s[OLD + i], s[BEFORE + i], s[INPUT + i] = s[BEFORE + i], s[INPUT + i], v[i]
 
 
-@register_jitable
+@jit.callee
 def _predict_float(s: np.ndarray, par: np.ndarray, i: int) -> float:
     """phi, and phi theta."""
     late = 0 if par[PRINTED] != 0.0 else BEFORE - INPUT
@@ -141,28 +144,7 @@ def _predict_float(s: np.ndarray, par: np.ndarray, i: int) -> float:
     return model
 
 
-@register_jitable
-def _identify_float(s: np.ndarray, par: np.ndarray, i: int, e: float) -> None:
-    trace = 0.0
-    for m in range(5):
-        trace += s[F + 25 * i + 6 * m]
-    forgetting = 1.0 if trace >= par[TRACE_MAX] else par[FORGETTING]
-    denominator = forgetting
-    for m in range(5):
-        s[F_PHI + m] = 0.0
-        for n in range(5):
-            s[F_PHI + m] += s[F + 25 * i + 5 * m + n] * s[PHI + n]
-        denominator += s[F_PHI + m] * s[PHI + m]
-    for m in range(5):
-        s[GAIN + m] = s[F_PHI + m] / denominator
-        s[THETA + 5 * i + m] += s[GAIN + m] * e
-        for n in range(5):
-            p = 25 * i + 5 * m + n
-            s[F + p] = (s[F + p] - s[GAIN + m] * s[F_PHI + n]) / forgetting
-    s[THETA + 5 * i + 2] = min(max(s[THETA + 5 * i + 2], par[B0_MIN + i]), par[B0_MAX + i])
-
-
-@register_jitable
+@jit.callee
 def _control_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> float:
     t = THETA + 5 * i
     a1, a2, b0, b1, d, y = s[t], s[t + 1], s[t + 2], s[t + 3], s[t + 4], s[Y + i]
@@ -177,17 +159,18 @@ def _control_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> f
         b1 = par[KAPPA] * b0
     top = _near_float(w0, y) + par[C1] * _near_float(w1, y) + par[C2] * _near_float(w2, y)
     top -= t0 * y + t1 * s[Y_BEFORE + i] + (b1 + b0 * s1) * s[INPUT + i] + b1 * s1 * s[BEFORE + i] + (1.0 + s1) * d
-    return top / b0
+    u: float = top / b0
+    return u
 
 
-@register_jitable
+@jit.callee
 def _decouple_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> bool:
     """out: from I0 times an Euler acceleration to torque; True if it had to be scaled down."""
     for i in range(3):
         out[i] *= par[DRIVE_OF + i]
         s[RATE + i] = ref[AHEAD + i] - ref[NEXT + i]
         s[ETA + i] = ref[NEXT + i] + 0.5 * s[RATE + i]
-    body = inverse_float(_triple(s, ETA), _triple(s, RATE), _triple(out, 0))
+    body = inverse_float(triple(s, ETA), triple(s, RATE), triple(out, 0))
     scale = 1.0
     for i in range(3):
         out[i] = body[i] * par[TORQUE_OF + i]
@@ -202,7 +185,6 @@ def _decouple_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.nda
 # -- fixed form --------------------------------------------------------------------------------------------------------
 
 
-@register_jitable
 def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick, in integers."""
     out[0], out[1], out[2], out[3], s[ARITHMETIC] = 0, 0, 0, 0, 0
@@ -238,41 +220,41 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
     s[STEPS] = min(s[STEPS] + 1, STEPS_MAX)
 
 
-@register_jitable
+@jit.callee
 def _rad_fixed(s: np.ndarray, angle: int, centre: int) -> int:
     """rad Q28 of an angle in bam, with the whole turns that bring it within half a turn of `centre` (rad Q28)."""
     turns = mul_q(centre, 2734261102, 30)  # unwrapped bam
     return keep32(mul_q(turns + wrap32(angle - turns), 843314857, 31), s, ARITHMETIC)
 
 
-@register_jitable
+@jit.callee
 def _take_inputs_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
     if par[PRINTED] == 0 and inp[2] != 0:
         n = par[TORQUE_SHIFT]
         v = (sat32(shift_round(inp[13], n)), sat32(shift_round(inp[14], n)), sat32(shift_round(inp[15], n)))
     else:
-        v = _triple(s, COMMAND)
+        v = triple(s, COMMAND)
     if par[DECOUPLE] != 0:
         b = (_drive_fixed(par, 0, v[0]), _drive_fixed(par, 1, v[1]), _drive_fixed(par, 2, v[2]))
-        a = forward_fixed(_triple(s, ETA), _triple(s, RATE), b)
+        a = forward_fixed(triple(s, ETA), triple(s, RATE), b)
         v = (_torque_fixed(par, 0, a[0]), _torque_fixed(par, 1, a[1]), _torque_fixed(par, 2, a[2]))
     for i in range(3):
         s[OLD + i], s[BEFORE + i], s[INPUT + i] = s[BEFORE + i], s[INPUT + i], v[i]
 
 
-@register_jitable
+@jit.callee
 def _drive_fixed(par: np.ndarray, i: int, torque: int) -> int:
     """Acceleration, turn36, of a torque Q28 on the inertia I0."""
     return sat32(mul_q(torque, par[DRIVE_OF + i], par[DRIVE_SHIFT + i]))
 
 
-@register_jitable
+@jit.callee
 def _torque_fixed(par: np.ndarray, i: int, acceleration: int) -> int:
     """The torque Q28 that gives the inertia I0 the acceleration, turn36."""
     return sat32(mul_q(acceleration, par[TORQUE_OF + i], par[DEMAND_SHIFT + i]))
 
 
-@register_jitable
+@jit.callee
 def _predict_fixed(s: np.ndarray, par: np.ndarray, i: int) -> int:
     late = 0 if par[PRINTED] != 0 else BEFORE - INPUT
     s[PHI], s[PHI + 1], s[PHI + 4] = sat32(-s[Y + i]), sat32(-s[Y_BEFORE + i]), 268435456
@@ -283,36 +265,14 @@ def _predict_fixed(s: np.ndarray, par: np.ndarray, i: int) -> int:
     return keep32(model, s, ARITHMETIC)
 
 
-@register_jitable
+@jit.callee
 def _identify_fixed(s: np.ndarray, par: np.ndarray, i: int, e: int) -> None:
-    """F Q20, F phi Q40, G Q28. A denominator that rounding brought below its least value leaves F and theta alone."""
-    trace = 0
-    for m in range(5):
-        trace += s[F + 25 * i + 6 * m]
-    forgets = trace < par[TRACE_MAX]
-    least = shift_round(par[FORGETTING], 2) if forgets else 268435456
-    denominator = least
-    for m in range(5):
-        s[F_PHI + m] = 0
-        for n in range(5):
-            s[F_PHI + m] += mul_q(s[F + 25 * i + 5 * m + n], s[PHI + n], 8)
-        denominator += mul_wide(s[F_PHI + m], s[PHI + m], 40)
-    if denominator < least:
-        s[ARITHMETIC] = 1
-        return
-    inverse = div_trunc(1 << 58, denominator)  # Q30
-    scale = par[FORGETTING_INV] if forgets else 1073741824
-    for m in range(5):
-        s[GAIN + m] = keep32(mul_wide(s[F_PHI + m], inverse, 42), s, ARITHMETIC)
-        s[THETA + 5 * i + m] = keep32(s[THETA + 5 * i + m] + mul_q(s[GAIN + m], e, 28), s, ARITHMETIC)
-        for n in range(m, 5):
-            rest = shift_round(s[F + 25 * i + 5 * m + n], -10) - mul_wide(s[F_PHI + n], s[GAIN + m], 38)
-            s[F + 25 * i + 5 * m + n] = keep32(mul_wide(rest, scale, 40), s, ARITHMETIC)
-            s[F + 25 * i + 5 * n + m] = s[F + 25 * i + 5 * m + n]
-    s[THETA + 5 * i + 2] = clip(s[THETA + 5 * i + 2], par[B0_MIN + i], par[B0_MAX + i])
+    theta, f = (THETA, THETA + 5, THETA + 10)[i], (F, F + 25, F + 50)[i]
+    identify_fixed(s, theta, f, PHI, par[FORGETTING], par[FORGETTING_INV], par[TRACE_MAX], e, ARITHMETIC)
+    s[theta + 2] = clip(s[theta + 2], par[B0_MIN + i], par[B0_MAX + i])
 
 
-@register_jitable
+@jit.callee
 def _control_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> int:
     a1, a2, b0, b1 = s[THETA + 5 * i], s[THETA + 5 * i + 1], s[THETA + 5 * i + 2], s[THETA + 5 * i + 3]
     y, c1, c2, d = s[Y + i], par[C1], par[C2], s[THETA + 5 * i + 4]
@@ -332,14 +292,14 @@ def _control_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, i: int) -> i
     return keep32(div_trunc(shift_round(clip(top, -8589934592, 8589934592), -28), b0), s, ARITHMETIC)
 
 
-@register_jitable
+@jit.callee
 def _decouple_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> bool:
     for i in range(3):
         out[i] = _drive_fixed(par, i, out[i])
         step = wrap32(ref[AHEAD + i] - ref[NEXT + i])
         s[RATE + i] = keep32(shift_round(step, -4), s, ARITHMETIC)
         s[ETA + i] = wrap32(ref[NEXT + i] + shift_round(step, 1))
-    body = inverse_fixed(_triple(s, ETA), _triple(s, RATE), _triple(out, 0))
+    body = inverse_fixed(triple(s, ETA), triple(s, RATE), triple(out, 0))
     scale = 1073741824
     for i in range(3):
         out[i] = _torque_fixed(par, i, body[i])
@@ -351,17 +311,7 @@ def _decouple_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.nda
     return scale < 1073741824
 
 
-# -- the law as the board sees it ----------------------------------------------------------------------------------------
-
-
-@jit.compile
-def _run_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_float(s, par, inp, ref, out)
-
-
-@jit.compile
-def _run_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_fixed(s, par, inp, ref, out)
+# -- the law as the board sees it --------------------------------------------------------------------------------------
 
 
 def nominal_fixed(mantissa: int, shift: int) -> int:
@@ -374,7 +324,7 @@ class Mrac(CompiledLaw):
 
     STATE = STATE
     functions = (step_float, step_fixed)
-    compiled = (_run_float, _run_fixed)
+    compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
     def initialise(self, state: np.ndarray) -> None:
         c = self.configuration
@@ -406,24 +356,25 @@ class Mrac(CompiledLaw):
     def fixed_par(configuration: Configuration) -> list[int]:
         common, p, one = configuration.common, configuration.params, 1 << 30
         if p["trace_max"] == NO_LIMIT:
-            raise LawRefuses("law mrac: expected a finite trace_max in the fixed form (F is int32 with 20 fractional bits)")
-        drive = [drive_fixed(common["period_us"], p[f"inertia_kgm2_{axis}"]) for axis in AXES]
-        demand = [demand_fixed(m, n) for m, n in drive]
-        b = [nominal_fixed(m, n) for m, n in drive]
+            raise LawRefuses("law mrac: expected a finite trace_max in the fixed form (F is int32, 20 fractional bits)")
+        scales = torque_scales_fixed(common["period_us"], [p[f"inertia_kgm2_{axis}"] for axis in AXES])
+        b = [nominal_fixed(scales[3 + i], scales[9 + i]) for i in range(3)]
         if max(b) > 2**30 - 1:
             raise LawRefuses("law mrac: expected T_s^2 / (2 inertia) of at most 4 in the fixed form")
         printed = int(p["design"] == DESIGN_PRINTED)
         par = [printed, -shift_round(p["c2_pole"], 1), mul_q(p["c2_pole"], p["c2_pole"], 32)]
         par += [p["kappa"], div_trunc(1 << 60, one + p["kappa"]), p["forgetting"], div_trunc(1 << 60, p["forgetting"])]
         par += [p["trace_max"], p["decouple"], p["identify"], common["torque_bits"] - 28, *torque_limits_fixed(common)]
-        par += [m for m, _ in demand] + [m for m, _ in drive] + [n for _, n in demand] + [n for _, n in drive]
-        return par + ([2684355] * 3 + [INT32_MAX] * 3 if printed else [shift_round(x, 1) for x in b] + [shift_round(x, -1) for x in b])
+        par += scales
+        if printed:
+            return par + [2684355] * 3 + [INT32_MAX] * 3
+        return par + [shift_round(x, 1) for x in b] + [shift_round(x, -1) for x in b]
 
     def telemetry(self) -> list[int]:
-        s = self.state.tolist()
-        theta, F_ = s[THETA : THETA + 15], [s[F + 25 * i : F + 25 * i + 25 : 6] for i in range(3)]
+        s: list[Any] = self.state.tolist()
+        theta, covariance = s[THETA : THETA + 15], [s[F + 25 * i : F + 25 * i + 25 : 6] for i in range(3)]
         if self.is_float:
-            words = [word_of(x, 2.0**-28) for x in theta] + [word_of(sum(f), 2.0**-16) for f in F_]
+            words = [word_of(x, 2.0**-28) for x in theta] + [word_of(sum(f), 2.0**-16) for f in covariance]
         else:
-            words = theta + [shift_round(sum(f), 4) for f in F_]
+            words = theta + [shift_round(sum(f), 4) for f in covariance]
         return limited(words, MRAC.telemetry)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba.extending import register_jitable
 
 from firmware_sim import jit
 from firmware_sim.controllers.compiled import CompiledLaw, Field, limited, offsets, torque_limits_fixed, word_of
@@ -35,7 +34,6 @@ KP, KD, LIMIT, KP_SHIFT, KD_SHIFT, TORQUE_SHIFT = 0, 3, 6, 9, 10, 13
 GAP_MAX = 1000000
 
 
-@register_jitable
 def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick; par KD = kd / T_s."""
     fresh = inp[0] != 0.0
@@ -57,7 +55,6 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         s[GAP] = min(s[GAP] + 1.0, 1e6)
 
 
-@register_jitable
 def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
     """One tick, in integers."""
     fresh = inp[0] != 0
@@ -85,18 +82,8 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         s[GAP] = min(s[GAP] + 1, GAP_MAX)
 
 
-@jit.compile
-def _run_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_float(s, par, inp, ref, out)
-
-
-@jit.compile
-def _run_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    step_fixed(s, par, inp, ref, out)
-
-
 def per_sample_fixed(gain: int, bits: int, period_us: int) -> tuple[int, int]:
-    """(m, n): gain 2^-bits / T_s on a change in rad Q29 gives a torque in Q28 as change m 2^-n; (0, 1) if negligible."""
+    """(m, n): gain 2^-bits / T_s times a change in rad Q29 is a torque Q28, change m 2^-n; (0, 1) if negligible."""
     size = div_trunc(mul_q(abs(gain), 1000000 << 10, 0), period_us)
     s = norm_shift(size)
     n = bits + 10 + 1 + s
@@ -112,7 +99,7 @@ class Pd(CompiledLaw):
     STATE = STATE
     has_model = False
     functions = (step_float, step_fixed)
-    compiled = (_run_float, _run_fixed)
+    compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
     @staticmethod
     def float_par(configuration: Configuration) -> list[float]:

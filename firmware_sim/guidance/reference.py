@@ -9,8 +9,8 @@ Critically damped, double pole p = exp(-wn T_s), lead d (r(k) first shows in ym(
     none:  ym = r(k)
 
 Start at the first reading y: ym up to m is y and, with zoh, r(k-1) = r(k), that is vm(m) = 2 ((1-p)/(1+p))^2 (r - y).
-Units: rad and samples, or bam (positions) and 2^-36 turn (rates, accelerations); the recursion itself runs on 2^-48 turn
-so that a slow model does not stick. Positions are modulo one turn.
+Units: rad and samples, or bam (positions) and 2^-36 turn (rates, accelerations); the recursion itself runs on 2^-48
+turn so that a slow model does not stick. Positions are modulo one turn.
 Source: study of paper 004, sections 0 and 3.1.
 """
 
@@ -20,7 +20,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numba.extending import register_jitable
 
 from firmware_sim import jit
 from firmware_sim.fixed import INT32_MAX, clip, div_trunc, mul_q, mul_wide, sat32, shift_round, wrap32, wrap_bits
@@ -38,7 +37,7 @@ KIND, K1, K2, START, ACCEL_MAX, RATE_MAX = range(6)
 RATE_LIMIT_48 = 1 << 46  # a quarter turn per sample: the largest rate the integers carry
 
 
-@register_jitable
+@jit.callee
 def restart_fixed(state: np.ndarray, i: int, position: int, rate: int) -> None:
     """Axis i begins anew: it stays at `position` (bam) up to t_(k+lead) and goes on from there at `rate` (turn36)."""
     for field in (PAST, NOW, NEXT, AHEAD):
@@ -49,7 +48,7 @@ def restart_fixed(state: np.ndarray, i: int, position: int, rate: int) -> None:
     state[HEAD_RATE + i] = shift_round(rate, -12)
 
 
-@register_jitable
+@jit.callee
 def restart_float(state: np.ndarray, i: int, position: float, rate: float) -> None:
     """As restart_fixed(), in rad."""
     for field in (PAST, NOW, NEXT, AHEAD, HEAD):
@@ -59,7 +58,7 @@ def restart_float(state: np.ndarray, i: int, position: float, rate: float) -> No
     state[HEAD_RATE + i] = rate
 
 
-@register_jitable
+@jit.callee
 def wrap_pi(angle: float) -> float:
     """angle modulo a turn, in [-pi, pi]; exact for angles that are there already."""
     if -math.pi <= angle <= math.pi:
@@ -67,7 +66,6 @@ def wrap_pi(angle: float) -> float:
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@register_jitable
 def advance_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     """One tick; inp[0] fresh, inp[3:6] euler, inp[19:22] set-point. True if the reference started in this tick."""
     started = False
@@ -85,7 +83,7 @@ def advance_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     return started
 
 
-@register_jitable
+@jit.callee
 def _advance_axis_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: int) -> None:
     position, rate = state[HEAD + i], state[HEAD_RATE + i]
     error = wrap32(inp[19 + i] - shift_round(position, 16))
@@ -114,7 +112,6 @@ def _advance_axis_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: 
         state[RATE_NOW + i], state[RATE_NEXT + i] = sat32(shift_round(rate, 12)), sat32(shift_round(rate_new, 12))
 
 
-@register_jitable
 def advance_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     """As advance_fixed(), in rad."""
     started = False
@@ -132,7 +129,7 @@ def advance_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
     return started
 
 
-@register_jitable
+@jit.callee
 def _advance_axis_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: int) -> None:
     position, rate = state[HEAD + i], state[HEAD_RATE + i]
     wanted = par[K1] * wrap_pi(inp[19 + i] - position) - par[K2] * rate
@@ -154,14 +151,7 @@ def _advance_axis_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: 
         state[RATE_NOW + i], state[RATE_NEXT + i] = rate, rate_new
 
 
-@jit.compile
-def _run_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
-    return advance_fixed(state, par, inp)
-
-
-@jit.compile
-def _run_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
-    return advance_float(state, par, inp)
+_run_fixed, _run_float = jit.compile(advance_fixed), jit.compile(advance_float)
 
 
 def parameters_fixed(common: Mapping[str, int]) -> list[int]:
