@@ -77,6 +77,7 @@ class Loop:
             raise PlantBroke(k)
         applied = self._limited(acting, motion)
         self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
+        self.recorder.commit(max(k - 1, 0))  # tick k - 1 is whole only now, with its answer; the board works meanwhile
         if not delay:
             self.board.drain(k)
             applied = self._limited(self.commands.decide(k), motion)
@@ -90,22 +91,26 @@ class Loop:
         self.clock.start(first * self.timing.period_ns)
         for k in range(first, self.timing.ticks):
             if stop():
-                return k, "interrupted"
+                self.board.drain(k - 1)
+                return self._ended(k, "interrupted")
             self._await_tick(k)
             try:
                 motion = self.tick(k)
             except PlantBroke:
                 self.recorder.event(k, events.PLANT_NAN, k, 0)
-                self.recorder.commit(k)
-                return k, "diverged"
+                return self._ended(k, "diverged")
             progress(k, motion)
             if self._beyond(k, motion):
-                self.recorder.commit(k)
-                return k + 1, "diverged"
+                self.board.drain(k)
+                return self._ended(k + 1, "diverged")
         self._await_tick(self.timing.ticks)
         self.board.finish(self.timing.ticks - 1)
-        self.recorder.commit(self.timing.ticks - 1)
-        return self.timing.ticks, "finished"
+        return self._ended(self.timing.ticks, "finished")
+
+    def _ended(self, ticks: int, reason: str) -> tuple[int, str]:
+        self._notices(ticks - 1)
+        self.recorder.commit(max(ticks - 1, 0))
+        return ticks, reason
 
     def _beyond(self, k: int, motion: Motion) -> bool:
         """An attitude angle beyond the scenario's bound ends the run: what follows says nothing more about the law."""
@@ -143,16 +148,19 @@ class Loop:
             valid |= 1 << sensor.bit
         torque = to_lsb(applied, self.scales.torque_Nm)
         momentum = to_lsb(motion.momentum_B, self.scales.momentum_Nms)
-        setpoint = self.setpoints(k)
-        return Sample(k, setpoint, torque, momentum, acting.ack, 0, acting.source, valid, tuple(readings))
+        euler, quaternion, rate = readings
+        shown = (euler, quaternion, rate)
+        return Sample(k, self.setpoints(k), torque, momentum, acting.ack, 0, acting.source, valid, shown)
 
     def _record(self, k: int, motion: Motion, applied: Vector) -> None:
+        self._notices(k)
+        self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
+        self.ticks_done = k + 1
+
+    def _notices(self, k: int) -> None:
         for code, a, b in self.commands.notices:
             self.recorder.event(k, code, a, b)
         self.commands.notices.clear()
-        self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
-        self.recorder.commit(k)
-        self.ticks_done = k + 1
 
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:

@@ -1,42 +1,12 @@
-"""End to end: the command line as a user runs it, in a directory of its own."""
+"""Fixtures of the end-to-end tests (subprocesses.py)."""
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import pytest
-
-REPO = Path(__file__).resolve().parents[2]
-
-
-@dataclass
-class Cli:
-    """`sil` as a subprocess, in `folder`."""
-
-    folder: Path
-
-    def start(self, *arguments: str, **options: Any) -> subprocess.Popen[str]:
-        # -P: not the clone's sources because they happen to lie in the working directory, but what is installed.
-        command = [sys.executable, "-P", "-m", "sil", *arguments]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-        return subprocess.Popen(command, cwd=self.folder, **{**pipes, **options})
-
-    def __call__(self, *arguments: str, code: int | None = 0) -> tuple[str, str]:
-        """(stdout, stderr); asserts the exit code."""
-        process = self.start(*arguments)
-        out, err = process.communicate(timeout=240)
-        assert code is None or process.returncode == code, f"exit {process.returncode}\n{out}\n{err}"
-        return out, err
-
-    def json(self, *arguments: str, code: int = 0) -> Any:
-        return json.loads(self(*arguments, "--json", code=code)[0])
+from subprocesses import Cli
 
 
 @pytest.fixture
@@ -57,33 +27,3 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return made[arguments]
 
     return run
-
-
-def children_of(pid: int) -> list[int]:
-    """Living processes whose parent is `pid`."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-            except OSError:
-                continue
-            if int(fields[1]) == pid and fields[0] != "Z":
-                found.append(int(entry.name))
-    return found
-
-
-def alive(pid: int) -> bool:
-    """The process exists and is no zombie."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
-
-
-def quiet(pid: int) -> None:
-    """Kill it if it is still there, so that a failing test leaves nothing behind."""
-    try:
-        os.kill(pid, 9)
-    except ProcessLookupError:
-        return

@@ -8,17 +8,17 @@ import json
 
 import pytest
 
-COLUMNS = (
-    "tick,t_s,phi_deg,theta_deg,psi_deg,ref_phi_deg,ref_theta_deg,ref_psi_deg,"
-    "command_x_Nm,command_y_Nm,command_z_Nm,applied_x_Nm,applied_y_Nm,applied_z_Nm,"
-    "w_x_radps,w_y_radps,w_z_radps,h_x_Nms,h_y_Nms,h_z_Nms,q_s,q_x,q_y,q_z"
-).split(",")
+COLUMNS = [
+    *("tick", "t_s", "phi_deg", "theta_deg", "psi_deg", "ref_phi_deg", "ref_theta_deg", "ref_psi_deg"),
+    *("command_x_Nm", "command_y_Nm", "command_z_Nm", "applied_x_Nm", "applied_y_Nm", "applied_z_Nm"),
+    *("w_x_radps", "w_y_radps", "w_z_radps", "h_x_Nms", "h_y_Nms", "h_z_Nms", "q_s", "q_x", "q_y", "q_z"),
+]
 VERBS = ("run", "plant", "board", "replay", "diff", "info", "plot", "export", "check", "scenarios", "recover")
 SHORT = ("appc-rs232", "--set", "duration_s=30", "--set", "require=[]")
 
 
 def test_run_prints_the_verdict_and_leaves_a_run_directory(cli):
-    out, err = cli("run", *SHORT, "--clock", "lockstep", "--out", "here")
+    out, _ = cli("run", *SHORT, "--clock", "lockstep", "--out", "here")
     assert "passed" in out
     names = {path.name for path in (cli.folder / "here").iterdir()}
     assert {"run.mcap", "timing.mcap", "run.journal", "summary.json"} <= names
@@ -144,7 +144,7 @@ def test_every_verb_has_help(cli, verb):
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        (("run", "no-such-scenario"), 2, "known"),
+        (("run", "no-such-scenario"), 2, "one of appc-rs232"),
         (("run", "appc-rs232", "--clock", "fast"), 2, "lockstep, realtime or scaled:N"),
         (("run", "appc-rs232", "--set", "law.name=lqr"), 2, "appc"),
         (("run", "appc-rs232", "--set", "period_s=2.0"), 2, "0.2 to 1"),

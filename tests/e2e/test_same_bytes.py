@@ -42,9 +42,7 @@ def test_another_seed_gives_other_bytes(tmp_path):
     assert fly(tmp_path / "a", "appc-rs232")["sha256"] != fly(tmp_path / "b", "appc-rs232", "seed=1")["sha256"]
 
 
-@pytest.mark.parametrize(
-    ("clock", "duration_s"), [("scaled:20", 100), ("realtime", 10)], ids=["scaled", "realtime"]
-)
+@pytest.mark.parametrize(("clock", "duration_s"), [("scaled:20", 100), ("realtime", 10)], ids=["scaled", "realtime"])
 def test_a_paced_run_without_a_real_miss_gives_the_lockstep_bytes(tmp_path, clock, duration_s, record_property):
     """A real miss makes the comparison inconclusive: repeated at most three times, then reported as not shown."""
     expected = fly(tmp_path / "lockstep", "appc-rs232", f"duration_s={duration_s}", "clock=lockstep")["sha256"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from conftest import BoardBench, commands, events_of, make_sample, telemetry
+from benches import BoardBench, commands, events_of, make_sample, telemetry
 
 from protocol import events, frames
 from protocol.law_tables import TELEMETRY_COMMON
