@@ -18,6 +18,7 @@ from protocol.frames import NO_TICK, Command, Event, Reading, Sample, Telemetry
 from protocol.law_tables import FORM_FLOAT, Configuration, LawTable, parse_configuration, refusal
 
 INT32_MAX = 2**31 - 1
+EVENTS_PER_ANSWER = 16  # further ones are only counted
 
 
 class FlightRefused(Exception):
@@ -71,7 +72,10 @@ class Flight:
     def _begin(self, first_tick: int) -> None:
         """Fresh law, reference and counters; what a start and a bumpless re-start have in common."""
         common = self._configuration.common
-        self._law = self._new_law(self._configuration)
+        try:
+            self._law = self._new_law(self._configuration)
+        except controllers.LawRefuses as error:
+            raise FlightRefused(str(error)) from None
         self._reference = Reference(common, self._float)
         dtype = np.float64 if self._float else np.int64
         self._inp = np.zeros(inputs.SIZE, dtype)
@@ -93,7 +97,8 @@ class Flight:
     def count_dropped(self, tick: int) -> None:
         """A SAMPLE for a tick that was already stepped."""
         self._dropped += 1
-        self._pending.append(Event(tick, events.STALE_SAMPLE, tick & 0x7FFFFFFF, self._dropped))
+        if len(self._pending) < EVENTS_PER_ANSWER:
+            self._pending.append(Event(tick, events.STALE_SAMPLE, tick & 0x7FFFFFFF, self._dropped))
 
     def restart(self, expected: int, tick: int) -> None:
         """Bumpless re-start: the gap is too long to propagate; law and reference begin anew at the next reading."""
@@ -215,6 +220,7 @@ class Flight:
         used = frames.USED if usable else frames.PROPAGATED if self._law.has_model else frames.REPEATED
         if self._restarted:
             used, self._restarted = frames.RESTARTED, False
+        notices = notices[:EVENTS_PER_ANSWER]
         due = self._telemetry_every > 0 and tick % self._telemetry_every == 0
         answer: list[Command | Telemetry | Event] = [Command(tick, torque, flags, due + len(notices), used)]
         if due:

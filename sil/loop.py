@@ -133,6 +133,7 @@ class Loop:
         self.recorder.timing(k, late_ns)
         if late_ns > self.timing.period_ns / self.clock.scale:
             self.degraded_ticks += 1
+            self.recorder.event(k, events.EPOCH_REBASED, k, min(late_ns // 1000, 2**31 - 1))
             self.clock.rebase(t_ns)
 
     def _limited(self, acting: Acting, motion: Motion) -> Vector:

@@ -28,7 +28,7 @@ class Session:
     def __init__(self, port: Port, clock_rate_q16: int, check_alive: Callable[[], None]) -> None:
         self._port = port
         self._check_alive = check_alive
-        self._nonce = secrets.randbits(64)
+        self._nonce = 1 + secrets.randbelow(2**64 - 1)  # 0 means no session
         self._hello = Hello(
             frames.PROTOCOL_VERSION, frames.ROLE_LAB, 0, frames.LAYOUT_HASH, self._nonce, clock_rate_q16, BUILD
         )
@@ -41,10 +41,13 @@ class Session:
 
         Raises LinkFailure: nobody answers, another protocol or layout, a refused word, another table.
         """
-        self._greet(within_s)
-        self._port.reset()
-        packets = [self._port.pack(part) for part in config.split(words)]
-        ready = self._configure(packets, notify)
+        while True:
+            self._greet(within_s)
+            self._port.reset()
+            packets = [self._port.pack(part) for part in config.split(words)]
+            ready = self._configure(packets, notify)
+            if ready is not None:
+                break
         if ready.table_hash != table_hash:
             raise LinkFailure(
                 f"board: READY with table {ready.table_hash:08x}, expected {table_hash:08x}: "
@@ -58,6 +61,7 @@ class Session:
 
     def _greet(self, within_s: float) -> None:
         give_up = time.monotonic() + within_s
+        self.board = None
         while self.board is None:
             self._port.send(self._hello)
             self.board = self._await(HELLO_EVERY_S, self._is_echo)
@@ -83,18 +87,29 @@ class Session:
         ours = hello.role == frames.ROLE_BOARD and hello.nonce == self._nonce and hello.flags & frames.HELLO_ECHO
         return hello if ours else None
 
-    def _configure(self, packets: list[bytes], notify: Callable[[str], None]) -> Ready:
-        """CONFIG is idempotent: the same packets again until READY, for as long as the board lives."""
+    def _configure(self, packets: list[bytes], notify: Callable[[str], None]) -> Ready | None:
+        """CONFIG is idempotent: the same packets again until READY, for as long as the board lives.
+
+        None: the board says HELLO unasked, so it was restarted and knows nothing of this session.
+        """
         told = False
         while True:
             self._port.write(*packets)
-            ready = self._await(CONFIG_EVERY_S, lambda p: p.frame if p.type == Type.READY else None)
-            if ready is not None:
-                return self._accepted(ready)
+            answer = self._await(CONFIG_EVERY_S, self._is_ready_or_restart)
+            if isinstance(answer, Ready):
+                return self._accepted(answer)
+            if answer is not None:
+                return None
             self._check_alive()
             if not told:
                 notify("the board is compiling its law (first run only)")
                 told = True
+
+    @staticmethod
+    def _is_ready_or_restart(packet: Packet) -> Ready | Hello | None:
+        frame: Ready | Hello = packet.frame
+        restarted = packet.type == Type.HELLO and not packet.frame.flags & frames.HELLO_ECHO
+        return frame if packet.type == Type.READY or restarted else None
 
     @staticmethod
     def _accepted(ready: Ready) -> Ready:
