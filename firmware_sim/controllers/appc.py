@@ -380,7 +380,7 @@ class Appc(CompiledLaw):
         pc, qc, qo = p["controller_pole"], one - p["controller_pole"], one - p["observer_pole"]
         qo2, po3 = mul_q(qo, qo, 30), mul_q(mul_q(p["observer_pole"], p["observer_pole"], 30), p["observer_pole"], 30)
         l2 = mul_q(mul_q(qo2, one + p["observer_pole"], 30), 3, 1)
-        gains = [mul_q(qc, qc, 30), mul_q(qc, pc + 3 * one, 31), one - po3, l2, mul_q(qo2, qo, 30)]
+        gains = [mul_q(qc, qc, 30), mul_q(qc, pc + (3 << 30), 31), one - po3, l2, mul_q(qo2, qo, 30)]
         orbit = mul_q(mul_q(p["orbit_rate_radps"], ts, 32), 2734261102, 34)
         shifts = [common["torque_bits"] - 28, common["momentum_bits"] - 28]
         scales = torque_scales_fixed(period_us, [p[f"inertia_kgm2_{axis}"] for axis in AXES])

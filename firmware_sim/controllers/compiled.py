@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, shift_round
+from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, div_trunc, shift_round
 from protocol.law_tables import AXES, FORM_FLOAT, Configuration, Word, refusal
 
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
@@ -122,6 +122,8 @@ def _ranges(table: tuple[Word, ...]) -> tuple[tuple[int, int], ...]:
 
 def torque_limits_fixed(common: Mapping[str, int]) -> list[int]:
     """torque_limit x, y, z in Q28; at most 8 N m, and at most what 32 bits of the wire's LSB hold."""
-    wire = shift_round(INT32_MAX, max(common["torque_bits"] - 28, 0)) - 1
-    limits = [shift_round(common[f"torque_limit_{axis}"], common["torque_bits"] - 28) for axis in AXES]
-    return [clip(limit, 0, min(wire, INT32_MAX)) for limit in limits]
+    bits = common["torque_bits"] - 28
+    words = [common[f"torque_limit_{axis}"] for axis in AXES]
+    if bits > 0:
+        return [div_trunc(word, shift_round(1, -bits)) for word in words]  # never above the limit
+    return [clip(shift_round(word, bits), 0, INT32_MAX) for word in words]

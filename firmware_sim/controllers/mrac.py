@@ -367,7 +367,7 @@ class Mrac(CompiledLaw):
         par += [p["trace_max"], p["decouple"], p["identify"], common["torque_bits"] - 28, *torque_limits_fixed(common)]
         par += scales
         if printed:
-            return par + [2684355] * 3 + [INT32_MAX] * 3
+            return [*par, 2684355, 2684355, 2684355, INT32_MAX, INT32_MAX, INT32_MAX]
         return par + [shift_round(x, 1) for x in b] + [shift_round(x, -1) for x in b]
 
     def telemetry(self) -> list[int]:
