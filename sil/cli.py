@@ -289,9 +289,9 @@ def _explained(error: Exception) -> int:
         return EXIT_USAGE
     if isinstance(error, SilError):
         code = error.exit_code
-    elif isinstance(error, LinkError):
+    elif isinstance(error, LinkError | SealError):
         code = EXIT_LINK
-    elif isinstance(error, ScenarioInvalid | RunError | JournalError | SealError | OSError):
+    elif isinstance(error, ScenarioInvalid | RunError | JournalError | OSError):
         code = EXIT_USAGE
     else:
         raise error

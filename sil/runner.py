@@ -7,8 +7,7 @@ import json
 import platform
 import signal
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -31,11 +30,9 @@ from sil.trouble import (
     EXIT_OK,
     EXIT_REQUIREMENT,
     LinkFailure,
-    SilError,
     UsageError,
 )
 
-Progress = Callable[[int, int, Motion], None]
 NUMBERS_DEPEND_ON = ("numpy", "numba")
 
 
@@ -69,16 +66,13 @@ def run_scenario(
     except JournalError as error:
         raise UsageError(str(error)) from None
     recorder = JournalRecorder(journal)
-    with stop_requests() as stop:
-        try:
-            outcome = _fly(scenario, folder, recorder, stop, watch, wired)
-        except BaseException:
-            journal.close()
-            raise
-    watch.stage("seal")
-    report = seal(folder)
-    summary = _summary(scenario, folder, outcome, report)
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    with StopRequests() as stop:
+        outcome = _fly(scenario, folder, recorder, stop, watch, wired)
+        watch.stage("seal")
+        report = seal(folder)
+        summary = _summary(scenario, folder, outcome, report)
+        text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
+        (folder / "summary.json").write_text(text, encoding="utf-8")
     return summary
 
 
@@ -98,7 +92,7 @@ def _fly(
     scenario: Scenario,
     folder: Path,
     recorder: JournalRecorder,
-    stop: Callable[[], bool],
+    stop: StopRequests,
     watch: Watch,
     wired: bool,
 ) -> Outcome:
@@ -108,9 +102,10 @@ def _fly(
     watch.stage("start")
     try:
         rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note, wired)
-    except SilError:
+    except BaseException:
         _discard(folder, recorder)
         raise
+    stop.hold()
     recorder.start(identity(scenario, rig), host_facts(scenario, rig))
     recorder.session(0)
     record_config(rig, recorder, 0)
@@ -118,7 +113,7 @@ def _fly(
     watch.stage("run")
     began = time.perf_counter()
     try:
-        outcome.ticks, outcome.reason = rig.loop.run(stop, lambda k, motion: watch.tick(k, scenario.ticks, motion))
+    """Assemble, loop, take down; once the journal has begun it is closed with END, whatever happened."""
     except (LinkError, LinkFailure, JournalError) as error:
         outcome.failure, outcome.ticks = _why(rig, error), rig.loop.ticks_done
     finally:
@@ -247,6 +242,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "exit_code": exit_code,
         "failure": outcome.failure,
         "scenario": scenario.name,
+        "board": scenario.board,
         "reason": outcome.reason,
         "ticks": outcome.ticks,
         "duration_s": outcome.ticks * scenario.period_ns * 1e-9,
@@ -327,25 +323,40 @@ def _plain(value: Any) -> Any:
 # -- signals -------------------------------------------------------------------------------------------------------
 
 
-@contextmanager
-def stop_requests() -> Iterator[Callable[[], bool]]:
-    """SIGINT and SIGTERM set a flag that the loop looks at each tick; a second one interrupts at once.
+class StopRequests:
+    """SIGINT and SIGTERM. Until `hold()` they interrupt at once: nothing was run yet, nothing can be lost. After it the
+    first one is a wish that the loop looks at each tick, so that log and summary are complete; a second one interrupts
+    a loop that does not come round.
 
-    Outside the main thread Python installs no handlers; then the flag stays down.
+    Outside the main thread Python installs no handlers; then nobody asks.
     """
-    asked: list[int] = []
 
-    def ask(number: int, _: object) -> None:
-        if asked:
-            raise KeyboardInterrupt
-        asked.append(number)
+    def __init__(self) -> None:
+        self._held = False
+        self._asked = 0
+        self._before: dict[int, Any] = {}
 
-    try:
-        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    except ValueError:
-        before = {}
-    try:
-        yield lambda: bool(asked)
-    finally:
-        for number, handler in before.items():
+    def asked(self) -> bool:
+        """Somebody wants the run to end."""
+        return self._asked > 0
+
+    def hold(self) -> None:
+        """From here on there is something to lose."""
+        self._held = True
+
+    def __enter__(self) -> StopRequests:
+        try:
+            for number in (signal.SIGINT, signal.SIGTERM):
+                self._before[number] = signal.signal(number, self._ask)
+        except ValueError:
+            self._before.clear()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for number, handler in self._before.items():
             signal.signal(number, handler)
+
+    def _ask(self, number: int, _: object) -> None:
+        self._asked += 1
+        if not self._held or self._asked > 1:
+            raise KeyboardInterrupt

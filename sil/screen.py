@@ -89,11 +89,10 @@ def show_summary(summary: Mapping[str, Any]) -> None:
         f"[bold {colour}]{summary['verdict']}[/]  {summary['scenario']}: {summary['ticks']} ticks, "
         f"{summary['duration_s']:g} s in {timing['wall_s']:.2f} s ({timing['times_real_time']:,.0f} x real time)"
     )
-    if summary["failure"]:
-        console.print(f"[red]{summary['failure']}[/]")
     table = Table(box=None, pad_edge=False, header_style="dim")
     for name in ("", *AXES, ""):
         table.add_column(name, justify="left" if not name else "right")
+    errors = summary["board"] != "none"  # without a board nobody follows a reference
     for key, label, unit, scale in (
         ("rms_error_deg", "rms error to reference", "deg", 1.0),
         ("peak_error_deg", "peak error to reference", "deg", 1.0),
@@ -102,14 +101,21 @@ def show_summary(summary: Mapping[str, Any]) -> None:
         ("peak_torque_Nm", "peak torque", "mN m", 1e3),
     ):
         values = summary["metrics"].get(key)
-        if values and any(value is not None for value in values):
+        if (errors or "error" not in key) and any(value is not None for value in values or ()):
             table.add_row(label, *(_number(value, scale) for value in values), unit)
     console.print(table)
     for line in summary["require"]:
         mark = "[green]met   [/]" if line["passed"] else "[red]missed[/]"
         console.print(f"{mark} {requirement_text(line)}")
+    if timing["degraded_ticks"]:
+        late_ms = timing["wakeup_us"]["max"] / 1000
+        console.print(
+            f"[yellow]degraded[/]: {timing['degraded_ticks']} of {summary['ticks']} ticks woke more than a period late, at "
+            f"most {late_ms:.1f} ms (a busy machine, or a clock too fast for it)"
+        )
     link = summary["link"]
-    console.print("link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items()))
+    if errors:
+        console.print("link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items()))
     if not summary["reproducible"]:
         console.print("[yellow]not reproducible[/]: commands missed the clock though the model had them in time")
     console.print(f"run: {summary['run_dir']}   sha256 {summary['sha256'][:16]}")

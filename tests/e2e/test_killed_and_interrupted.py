@@ -58,6 +58,15 @@ def test_a_signal_ends_both_processes_and_leaves_a_complete_log(cli, number):
     assert json.loads((cli.folder / "run" / "summary.json").read_text()) == summary
 
 
+def test_a_signal_before_anything_ran_leaves_nothing_behind(cli):
+    process = cli.start("plant", "appc-rs232", "--link", "pty", "--out", "run")
+    assert "waiting for a board" in process.stderr.readline()
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert not (cli.folder / "run").exists()
+
+
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_killed_plant_process_leaves_every_row_up_to_the_tick_before(cli, recorded, seed):
     process, board = started(cli, ticks=random.Random(seed).randrange(20, 150))

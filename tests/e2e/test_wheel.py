@@ -1,4 +1,4 @@
-"""The product as a wheel, outside the clone: nothing is written beside it, and no namesake in the working directory runs."""
+"""The product as a wheel, outside the clone: nothing is written beside it, no namesake in the working directory runs."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def site(tmp_path_factory):
     source = folder / "source"
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=REPO, capture_output=True, check=True).stdout.decode()
     for name in filter(None, tracked.split("\0")):
-        if name.startswith(("protocol/", "firmware_sim/", "sil/")) or name in ("pyproject.toml", "README.md", "LICENSE"):
+        if name.startswith(("protocol/", "firmware_sim/", "sil/", "pyproject.toml", "README.md", "LICENSE")):
             (source / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(REPO / name, source / name)
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(source)]
