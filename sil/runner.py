@@ -112,8 +112,12 @@ def _fly(
     outcome.start_s = time.perf_counter() - started
     watch.stage("run")
     began = time.perf_counter()
+
+    def show(tick: int, motion: Motion) -> None:
+        watch.tick(tick, scenario.ticks, motion)
+
     try:
-    """Assemble, loop, take down; once the journal has begun it is closed with END, whatever happened."""
+        outcome.ticks, outcome.reason = rig.loop.run(stop.asked, show)
     except (LinkError, LinkFailure, JournalError) as error:
         outcome.failure, outcome.ticks = _why(rig, error), rig.loop.ticks_done
     finally:
