@@ -64,6 +64,7 @@ class LawTable(NamedTuple):
     needs: int
     variant_word: str = ""
     variants: tuple[Variant, ...] = ()
+    finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
 
     def variant(self, params: Mapping[str, float]) -> Variant:
         """The design that these parameter values choose; of a law with one design, that one."""
@@ -156,8 +157,8 @@ MRAC = LawTable(
         _flag("decouple", 0, "Euler decoupling along the reference (MID)"),
         _flag("identify", 1, "recursive least squares on or off"),
         *_INERTIA_WORDS,
-        *_vector("printed_b0", "rad/(N m)", 30, -2, 2, (0.307, 0.305, 0.302), "printed design: b0"),
-        *_vector("printed_b1", "rad/(N m)", 30, -2, 2, (0.0586, 0.0411, 0.0404), "printed design: b1"),
+        *_vector("printed_b0", "rad/(N m)", 30, -1.99, 1.99, (0.307, 0.305, 0.302), "printed design: b0"),
+        *_vector("printed_b1", "rad/(N m)", 30, -1.99, 1.99, (0.0586, 0.0411, 0.0404), "printed design: b1"),
     ),
     telemetry=(
         *(Word(f"{name}_{axis}", "", 28, -8, 8, 0, f"identified {name}, {axis}") for axis in AXES for name in _THETA),
@@ -169,6 +170,7 @@ MRAC = LawTable(
     needs=READ_EULER,
     variant_word="design",
     variants=(Variant((0, 1), (1,), {"c2_pole": 0.001}), Variant((1,), (2,))),
+    finite_in_fixed=("trace_max",),  # F is int32 with 20 fractional bits
 )
 
 APPC = LawTable(
@@ -368,6 +370,9 @@ def refusal(configuration: Configuration) -> str | None:
     if common["reference_lead"] not in variant.reference_leads:
         known = ", ".join(map(str, variant.reference_leads))
         return f"law {table.name}: expected reference_lead {known}, got {common['reference_lead']}"
+    for name in table.finite_in_fixed:
+        if common["form"] == FORM_FIXED and configuration.params[name] == NO_LIMIT:
+            return f"law {table.name}: expected a finite {name} in the fixed form, got no limit"
     if table.needs & ~common["readings_mask"]:
         return f"law {table.name}: expected readings_mask with bits {table.needs}, got {common['readings_mask']}"
     return None

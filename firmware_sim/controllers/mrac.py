@@ -47,7 +47,7 @@ from firmware_sim.controllers.kinematics import (
 from firmware_sim.controllers.rls import identify_fixed, identify_float
 from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import AHEAD, NEXT, NOW, PAST
-from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, NO_LIMIT, Configuration
+from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, Configuration
 
 STATE = (
     Field("theta", 15, "rad, N m", 28),
@@ -355,8 +355,6 @@ class Mrac(CompiledLaw):
     @staticmethod
     def fixed_par(configuration: Configuration) -> list[int]:
         common, p, one = configuration.common, configuration.params, 1 << 30
-        if p["trace_max"] == NO_LIMIT:
-            raise LawRefuses("law mrac: expected a finite trace_max in the fixed form (F is int32, 20 fractional bits)")
         scales = torque_scales_fixed(common["period_us"], [p[f"inertia_kgm2_{axis}"] for axis in AXES])
         b = [nominal_fixed(scales[3 + i], scales[9 + i]) for i in range(3)]
         if max(b) > 2**30 - 1:

@@ -94,7 +94,10 @@ def run(case: Case) -> Trace:
     noise = np.random.default_rng(7).standard_normal((case.ticks, 3)) * case.noise_deg
     scale, lsb = inputs.si_scale(common), 2.0 ** -common["torque_bits"]
     exact = case.bits == 0
-    inp, out = np.zeros(inputs.SIZE, np.float64 if is_float else np.int64), np.zeros(4, np.float64 if is_float else np.int64)
+    inp, out = (
+        np.zeros(inputs.SIZE, np.float64 if is_float else np.int64),
+        np.zeros(4, np.float64 if is_float else np.int64),
+    )
     command, good, rows = np.zeros(3), 0, []
     for k in range(case.ticks):
         motion = plant.motion(k * TS_NS)

@@ -1,4 +1,4 @@
-"""The fixed forms against the float forms, each in its own closed loop with the same readings' noise and CONFIG values."""
+"""The fixed forms against the float forms, each in its own closed loop, with the same noise and CONFIG values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lost SAMPLEs (DESIGN 4): laws with a model propagate it, pd repeats; nothing stale is used as fresh; both forms alike."""
+"""Lost SAMPLEs: laws with a model propagate it, pd repeats; nothing stale is used as fresh; both forms alike."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ FILES = sorted([*PACKAGE.glob("controllers/*.py"), *PACKAGE.glob("guidance/*.py"
 
 
 def banned_operations(source: str) -> Iterator[str]:
-    """Line and operator of each raw operation on values in a function whose name says fixed; indices may do as they like.
+    """Line and operator of each raw operation in a function whose name says fixed; indices may do as they like.
 
     Constants among themselves (1 << 56) are no law values.
     """
@@ -63,5 +63,7 @@ def test_laws_call_no_libm_in_their_fixed_forms() -> None:
 
 
 def _annotations(function: ast.FunctionDef) -> set[str]:
-    found = [arg.annotation for arg in function.args.args if arg.annotation] + ([function.returns] if function.returns else [])
+    found = [arg.annotation for arg in function.args.args if arg.annotation] + (
+        [function.returns] if function.returns else []
+    )
     return {node.id for annotation in found for node in ast.walk(annotation) if isinstance(node, ast.Name)}

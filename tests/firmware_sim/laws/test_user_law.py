@@ -90,7 +90,10 @@ def test_a_law_with_a_model_is_asked_without_a_reading_and_never_sees_a_stale_on
         ("class Law: pass\n", "expected a method step"),
         ("class Law:\n    PARAMS = {'k': (1, 'N', 1e-6)}\n    def step(self, s): ...\n", "expected a method init"),
         ("class Law:\n    PARAMS = 3\n    def step(self, s): ...\n", "PARAMS: expected"),
-        ("class Law:\n    PARAMS = {'k': 3}\n    def init(self, p): ...\n    def step(self, s): ...\n", "PARAMS['k']: exp"),
+        (
+            "class Law:\n    PARAMS = {'k': 3}\n    def init(self, p): ...\n    def step(self, s): ...\n",
+            "PARAMS['k']: exp",
+        ),
         (
             "class Law:\n    PARAMS = {'k': (9, '', 1e-9)}\n    def init(self, p): ...\n    def step(self, s): ...\n",
             "does not fit 32 bits",
