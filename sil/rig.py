@@ -73,14 +73,15 @@ def assemble(
     notify: Notify,
     wired: bool = False,
     channel: Channel | None = None,
+    clock: Clock | None = None,
 ) -> Rig:
     """Build everything; with a board, the session is open and the board READY. Raises SilError with one line.
 
     log: file for a board process's stderr. wired: somebody else starts the board, whatever the scenario says.
-    channel: what happens to frames on the way; None: the clear channel of `link.baud`.
+    channel: what happens to frames on the way; None: the clear channel of `link.baud`. clock: None: the scenario's.
     """
     try:
-        clock = new_clock(scenario.clock)
+        clock = clock or new_clock(scenario.clock)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
         return _with_board(scenario, clock, recorder, log, notify, wired, channel or Clear(scenario.link.baud))

@@ -109,10 +109,8 @@ def show_summary(summary: Mapping[str, Any]) -> None:
         console.print(f"{mark} {requirement_text(line)}")
     if timing["degraded_ticks"]:
         late_ms = timing["wakeup_us"]["max"] / 1000
-        console.print(
-            f"[yellow]degraded[/]: {timing['degraded_ticks']} of {summary['ticks']} ticks woke more than a period late, at "
-            f"most {late_ms:.1f} ms (a busy machine, or a clock too fast for it)"
-        )
+        woke = f"{timing['degraded_ticks']} of {summary['ticks']} ticks woke more than a period late"
+        console.print(f"[yellow]degraded[/]: {woke}, at most {late_ms:.1f} ms: a busy machine or too fast a clock")
     link = summary["link"]
     if errors:
         console.print("link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items()))

@@ -118,7 +118,7 @@ class Session:
         reasons = {
             frames.READY_BAD_WORD: f"CONFIG word {ready.index} is out of its range",
             frames.READY_UNKNOWN_LAW: "it does not know this law or version",
-            frames.READY_LAW_REFUSES: "the law refuses this period or transport delay",
+            frames.READY_LAW_REFUSES: "the law refuses this period, transport delay, reading or arithmetic",
             frames.READY_MISSING_PARTS: "CONFIG words are missing",
         }
         raise LinkFailure(f"board: not ready: {reasons.get(ready.status, f'status {ready.status}')}")

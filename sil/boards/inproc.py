@@ -17,7 +17,7 @@ class InprocBoard:
         lab_end, board_end = inproc.pair()
         self.link: Link = lab_end
         self._port = Port(board_end)
-        self._board = Board(self._port, HostHal(self._port), _user_law(order.law_file))
+        self.board = Board(self._port, HostHal(self._port), _user_law(order.law_file))
         lab_end.pump = self._run_until_idle
 
     def check_alive(self) -> None:
@@ -32,7 +32,7 @@ class InprocBoard:
 
     def _run_until_idle(self) -> None:
         while (packet := self._port.receive(0.0)) is not None:
-            self._board.handle(packet)
+            self.board.handle(packet)
 
 
 def _user_law(law_file: str) -> UserLawClass | None:

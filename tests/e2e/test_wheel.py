@@ -1,4 +1,4 @@
-"""The product as a wheel, outside the clone: nothing is written beside it, no namesake in the working directory runs."""
+"""The product as a wheel, outside the clone: nothing is written beside it, no namesake in the working directory."""
 
 from __future__ import annotations
 

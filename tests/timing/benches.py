@@ -174,14 +174,38 @@ class Rows:
 class LabBench:
     """A whole lab with the board in process, lockstep, and a scripted channel; `rows` is what was recorded."""
 
-    def __init__(self, channel: Script | None = None, **values: Any) -> None:
+    def __init__(self, channel: Script | None = None, clock: Any = None, **values: Any) -> None:
         content = {"board": "inproc", "link": "inproc", "duration_s": 20.0, **values}
         self.scenario = load_values(content)
         self.rows = Rows()
-        self.rig = assemble(self.scenario, self.rows, None, lambda line: None, channel=channel or Script())
+        quiet = lambda line: None  # noqa: E731
+        self.rig = assemble(self.scenario, self.rows, None, quiet, channel=channel or Script(), clock=clock)
         record_config(self.rig, self.rows, 0)
 
     def run(self) -> Rows:
         self.rig.loop.run(lambda: False, lambda tick, motion: None)
         self.rig.stop(0)
         return self.rows
+
+
+class StallingClock:
+    """A paced clock whose wake-ups are as late as a test says; `at_wait` is called as the lab goes to sleep."""
+
+    paced = True
+    scale = 1.0
+
+    def __init__(self, late_ns: dict[int, int] | None = None, at_wait: Any = None) -> None:
+        self.late_ns, self.at_wait = late_ns or {}, at_wait
+        self.rebased: list[int] = []
+
+    def start(self, first_tick_ns: int) -> None:
+        pass
+
+    def wait(self, t_ns: int, listen: Any) -> int:
+        listen(0.0)
+        if self.at_wait is not None:
+            self.at_wait(t_ns)
+        return self.late_ns.get(t_ns, 0)
+
+    def rebase(self, t_ns: int) -> None:
+        self.rebased.append(t_ns)

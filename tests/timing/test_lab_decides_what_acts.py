@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from benches import Script
+from benches import Script, StallingClock
 
 from protocol import events
 from protocol.frames import FRESH, HELD, NO_TICK, PROPAGATED, USED, ZERO
@@ -141,6 +141,43 @@ def test_wire_time_at_the_modelled_baud_counts(lab):
 def test_one_write_per_tick(lab):
     rows = lab().run()
     assert rows.commits == [0, *range(TICKS)]
+
+
+# -- real time: a lab that wakes late, a board that does not wait -----------------------------------------------------
+
+
+def test_a_wake_up_more_than_a_period_late_moves_the_epoch_and_is_counted(lab):
+    period = 500_000_000
+    clock = StallingClock({10 * period: period + 1, 20 * period: period})
+    bench = lab(clock=clock)
+    rows = bench.run()
+    assert clock.rebased == [10 * period]
+    assert bench.rig.loop.degraded_ticks == 1
+    assert rows.events_with(events.EPOCH_REBASED) == [(10, 10, (period + 1) // 1000)]
+    assert [tick for tick, _, _ in rows.truths] == list(range(TICKS))  # neither skipped nor burst
+
+
+def test_a_clock_that_is_never_late_gives_the_lockstep_packets(lab):
+    lockstep, paced = lab().run(), lab(clock=StallingClock()).run()
+    assert paced.packets == lockstep.packets
+
+
+def test_a_board_whose_timer_was_faster_is_a_real_miss_and_its_early_answer_acts(lab):
+    """The lab sleeps through a SAMPLE: the board steps ticks 10 to 12 alone, then the lab goes on where it was."""
+
+    def at_wait(t_ns):
+        if t_ns == 10 * 500_000_000:
+            for _ in range(3):
+                bench.rig.host.board.on_timer()
+
+    bench = lab(clock=StallingClock(at_wait=at_wait))
+    rows = bench.run()
+    used = {command.tick: command.used for command in rows.commands()}
+    assert [used[tick] for tick in range(8, 15)] == [USED, USED, PROPAGATED, PROPAGATED, PROPAGATED, USED, USED]
+    assert bench.rig.window.real_misses == 3
+    assert bench.rig.window.missed == 0
+    assert rows.sources()[1:] == [FRESH] * (TICKS - 1)
+    assert len(rows.commands()) == TICKS
 
 
 # -- the pieces ------------------------------------------------------------------------------------------------------
