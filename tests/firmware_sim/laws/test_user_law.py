@@ -13,7 +13,7 @@ from firmware_sim.controllers.user import LawFailed, LawFileError, load_user_law
 from firmware_sim.guidance.reference import Reference
 from protocol.law_tables import USER_LAW_ID, config_words, parse_configuration
 
-MY_PD = Path(__file__).with_name("my_pd.py")
+MY_PD = Path(__file__).resolve().parents[3] / "docs" / "examples" / "my_pd.py"
 
 
 def build(spec: str, form: str = "float", **values: object):
