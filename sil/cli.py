@@ -208,7 +208,6 @@ def export(
 def check(scenario: ScenarioArgument, set_: SetOption = None, as_json: JsonOption = False) -> int:
     """Validate a scenario and its time budget (wire and execution time against the period) without running it."""
     from sil.checks import check as findings_of
-    from sil.rig import law_orders
 
     loaded = _scenario(scenario, set_)
     findings = findings_of(loaded)
@@ -219,8 +218,6 @@ def check(scenario: ScenarioArgument, set_: SetOption = None, as_json: JsonOptio
         print(finding, file=sys.stderr)
     if errors:
         return EXIT_USAGE
-    if loaded.board != "none":
-        law_orders(loaded)
     if not as_json:
         print(f"{loaded.name}: valid, {loaded.ticks} ticks of {loaded.period_s:g} s")
     return EXIT_OK

@@ -16,6 +16,7 @@ import numpy as np
 
 from protocol import frames
 from protocol.links import LinkError
+from sil.checks import check
 from sil.metrics import Judgement, judge, measure
 from sil.rig import Rig, assemble, record_config, user_law_spec
 from sil.runs import open_run
@@ -60,6 +61,7 @@ def run_scenario(
     starts the board; wait for it.
     """
     watch = watch or Watch()
+    refuse_hopeless(scenario)
     folder = new_run_dir(scenario.name, out)
     try:
         journal = Journal(folder / "run.journal")
@@ -74,6 +76,13 @@ def run_scenario(
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
         (folder / "summary.json").write_text(text, encoding="utf-8")
     return summary
+
+
+def refuse_hopeless(scenario: Scenario) -> None:
+    """What `sil check` calls an error is not run: UsageError, one line each (`expect_missed` admits missed deadlines)."""
+    errors = [str(finding) for finding in check(scenario) if finding.severity == "error"]
+    if errors:
+        raise UsageError("\n".join(errors))
 
 
 class Outcome:
