@@ -79,7 +79,7 @@ def run_scenario(
 
 
 def refuse_hopeless(scenario: Scenario) -> None:
-    """What `sil check` calls an error is not run: UsageError, one line each (`expect_missed` admits missed deadlines)."""
+    """What `sil check` calls an error is not run: UsageError, a line each (`expect_missed` admits missed deadlines)."""
     errors = [str(finding) for finding in check(scenario) if finding.severity == "error"]
     if errors:
         raise UsageError("\n".join(errors))
