@@ -15,7 +15,7 @@ from protocol.frames import Command, Packet, Sample, Tick, Type
 from protocol.port import Port
 from sil.commands import CommandWindow, ExecutionModel
 from sil.signals import Recorder
-from sil.sinks.journal import Direction
+from sil.sinks.journal import NO_ANSWER, Direction
 from sil.sinks.journal import Fate as Outcome
 from sil.trouble import LinkFailure
 
@@ -53,6 +53,7 @@ class Answers:
         self._sent_wall_ns = 0
         self._heard_wall_ns = time.monotonic_ns()
         self.answer_ns: list[int] = []
+        self.last_answer_ns = NO_ANSWER
         self.duplicates = 0
         self.overruns = 0
         self._sample_size = 0  # bytes on the wire
@@ -62,6 +63,7 @@ class Answers:
     def send(self, sample: Sample, t_ns: int) -> None:
         """SAMPLE(k), or in lockstep TICK(k) where the link does not deliver it (TICK is never faulted)."""
         tick = self._tick = sample.tick
+        self.last_answer_ns = NO_ANSWER
         if not self._sample_size:
             self._sample_size = len(frames.pack(sample, 0)) + ENCODED_EXTRA
         fate = self._channel.fate(TO_BOARD, tick, Type.SAMPLE, 0, self._sample_size, t_ns)
@@ -154,7 +156,8 @@ class Answers:
         if command.used in (frames.PROPAGATED, frames.REPEATED) and tick in self._should_use:
             self._window.board_was_faster(tick)
         if tick == self._tick:
-            self.answer_ns.append(self._heard_wall_ns - self._sent_wall_ns)
+            self.last_answer_ns = self._heard_wall_ns - self._sent_wall_ns
+            self.answer_ns.append(self.last_answer_ns)
         x, y, z = command.torque
         unit = self._torque_Nm
         fate = self._fate(packet)

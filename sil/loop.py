@@ -66,11 +66,13 @@ class Loop:
         self.degraded_ticks = 0
         self.ticks_done = timing.first_tick
         self.lateness_ns: list[int] = []
+        self._late_ns: dict[int, int] = {}  # of the ticks that are not yet whole
 
     def tick(self, k: int) -> Motion:
         """One tick. With delay 0 (lockstep only) the plant waits for COMMAND(k) before it integrates."""
         delay, t_ns = self.timing.delay, k * self.timing.period_ns
         self.board.drain(k - 1)  # (1)
+        self._timing(k - 1)
         acting = self.commands.decide(k - delay) if delay else self.commands.acting  # (2)
         motion = self.plant.motion(t_ns)
         if not math.isfinite(sum(motion.euler_rad.tolist())):
@@ -108,6 +110,7 @@ class Loop:
         return self._ended(self.timing.ticks, "finished")
 
     def _ended(self, ticks: int, reason: str) -> tuple[int, str]:
+        self._timing(ticks - 1)
         self._notices(ticks - 1)
         self.recorder.commit(max(ticks - 1, 0))
         return ticks, reason
@@ -130,7 +133,7 @@ class Loop:
         t_ns = k * self.timing.period_ns
         late_ns = self.clock.wait(t_ns, self.board.listen)
         self.lateness_ns.append(late_ns)
-        self.recorder.timing(k, late_ns)
+        self._late_ns[k] = late_ns
         if late_ns > self.timing.period_ns / self.clock.scale:
             self.degraded_ticks += 1
             self.recorder.event(k, events.EPOCH_REBASED, k, min(late_ns // 1000, 2**31 - 1))
@@ -157,6 +160,11 @@ class Loop:
         self._notices(k)
         self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
         self.ticks_done = k + 1
+
+    def _timing(self, k: int) -> None:
+        """Host times of tick k, known once its answer is here."""
+        if k >= self.timing.first_tick:
+            self.recorder.timing(k, self._late_ns.pop(k, 0), self.board.last_answer_ns)
 
     def _notices(self, k: int) -> None:
         for code, a, b in self.commands.notices:

@@ -58,6 +58,8 @@ class Sensor(Protocol):
 class Counterpart(Protocol):
     """The other end of the cable as the loop sees it: a board, or nobody."""
 
+    last_answer_ns: int  # wall time from the newest SAMPLE to its COMMAND; -1 while there is none
+
     def send(self, sample: Sample, t_ns: int) -> None:
         """SAMPLE(k) leaves at t_k."""
 
@@ -88,8 +90,8 @@ class Recorder(Protocol):
     ) -> None:
         """The plant at t_k and the torque that acts from t_k on."""
 
-    def timing(self, tick: int, lateness_ns: int) -> None:
-        """How late the tick woke up on the wall clock."""
+    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
+        """How late the tick woke up on the wall clock, and how long the board took to answer (-1: no answer)."""
 
     def commit(self, tick: int) -> None:
         """Everything of this tick has been handed over: one write."""

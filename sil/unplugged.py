@@ -5,6 +5,7 @@ from __future__ import annotations
 from protocol.frames import FRESH, NO_TICK, ZERO, Sample
 from sil.commands import Acting
 from sil.signals import Vector
+from sil.sinks.journal import NO_ANSWER
 
 
 class Scheduled:
@@ -27,6 +28,8 @@ class Scheduled:
 
 class Nobody:
     """The other end of a cable that is not plugged in."""
+
+    last_answer_ns = NO_ANSWER
 
     def send(self, sample: Sample, t_ns: int) -> None:
         """Into the void."""

@@ -43,8 +43,8 @@ class JournalRecorder:
         q, w, h, euler, applied = (row.tolist() for row in rows)
         self._journal.add(Kind.TRUTH, tick, journal.truth_payload(q, w, h, euler, applied, setpoint_bam, source))
 
-    def timing(self, tick: int, lateness_ns: int) -> None:
-        self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns))
+    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
+        self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns, answer_ns))
 
     def commit(self, tick: int) -> None:
         self._journal.commit(tick)
