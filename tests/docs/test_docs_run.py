@@ -1,0 +1,237 @@
+"""What the documents show is true: their commands run, their files and verbs and scenarios exist, their output is real.
+
+The guide's blocks are named in the line that opens them: `sh test` runs line by line, `yaml FILE` and `python FILE`
+are files, `sh same` runs and prints what stands below each command, `sh terminal-1` and `-2` run side by side,
+`sh example` flies the example law.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+import typer.main
+
+from sil.cli import app
+from sil.scenario import load_scenario
+from sil.scenarios import list_scenarios
+
+REPO = Path(__file__).resolve().parents[2]
+DOCUMENTS = [REPO / "README.md", REPO / "CHANGELOG.md", *sorted((REPO / "docs").glob("*.md"))]
+FENCE = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+EXIT = re.compile(r"\s+# exit (\d+)$")
+
+
+class Block(NamedTuple):
+    """A fenced block: language, its name (such as `test`), text."""
+
+    language: str
+    name: str
+    text: str
+
+    def commands(self) -> list[tuple[str, int]]:
+        """(command, exit code) of every line."""
+        lines = [line for line in self.text.splitlines() if line]
+        return [(EXIT.sub("", line), int(found[1]) if (found := EXIT.search(line)) else 0) for line in lines]
+
+
+def blocks(document: str) -> list[Block]:
+    return [Block(*(part or "" for part in found)) for found in FENCE.findall((REPO / document).read_text())]
+
+
+def named(document: str, language: str, name: str) -> Block:
+    (found,) = [block for block in blocks(document) if (block.language, block.name) == (language, name)]
+    return found
+
+
+def environment() -> dict[str, str]:
+    """`sil` and `python` are this interpreter's; colours and widths do not depend on who runs the test."""
+    here = str(Path(sys.executable).parent)
+    return {**os.environ, "PATH": f"{here}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "200", "PYTHONSAFEPATH": "1"}
+
+
+def shell(command: str, folder: Path, code: int | None = 0) -> str:
+    """stdout and stderr of one command; asserts the exit code, None: any."""
+    done = subprocess.run(
+        command,
+        shell=True,
+        cwd=folder,
+        env=environment(),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=120,
+    )
+    assert code in (None, done.returncode), (
+        f"{command}: exit {done.returncode}, the document says {code}\n{done.stdout}"
+    )
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A directory in which every file that the guide shows lies."""
+    folder = tmp_path_factory.mktemp("guide")
+    for block in blocks("docs/GUIDE.md"):
+        if block.language in ("yaml", "python") and block.name:
+            (folder / block.name).write_text(block.text)
+    return folder
+
+
+# -- the guide -----------------------------------------------------------------------------------------------------
+
+
+def test_the_guides_commands_run_and_exit_as_it_says(guide: Path) -> None:
+    count = 0
+    for block in blocks("docs/GUIDE.md"):
+        if (block.language, block.name) == ("sh", "test"):
+            for command, code in block.commands():
+                paced = "--clock scaled" in command  # a busy machine may degrade it, which is not the guide's fault
+                printed = shell(command, guide, None if paced else code)
+                assert not paced or printed.startswith(("passed", "degraded")), printed
+                count += 1
+        elif block.language == "python" and block.name == "reads.py":
+            shell(f"python {block.name}", guide)
+    assert count >= 15
+
+
+def test_the_guides_error_lines_are_the_programs(tmp_path: Path) -> None:
+    lines = iter(named("docs/GUIDE.md", "sh", "same").text.splitlines())
+    for line in lines:
+        printed = shell(EXIT.sub("", line), tmp_path, int(EXIT.search(line)[1]))  # type: ignore[index]
+        assert printed.strip() == next(lines)
+
+
+def test_two_terminals(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = str(free.getsockname()[1])
+    one, two = (named("docs/GUIDE.md", "sh", f"terminal-{n}").text.strip().replace("5005", port) for n in (1, 2))
+    board, plant = one, two.replace("scaled:20", "lockstep")
+    with subprocess.Popen(board.split(), cwd=tmp_path, env=environment(), stdout=subprocess.PIPE, text=True) as serving:
+        try:
+            assert serving.stdout is not None and port in serving.stdout.readline()
+            assert "passed" in shell(plant, tmp_path)
+        finally:
+            serving.terminate()
+
+
+def test_scenarios_shown_are_valid_and_the_defaults_said_are_the_defaults(guide: Path) -> None:
+    shown, default = load_scenario(guide / "keys.yaml").resolved(), load_scenario(guide / "empty.yaml").resolved()
+    remarked = {"name", "link", "law", "guidance", "require"}
+    assert {key for key in shown if shown[key] != default[key]} <= remarked
+    assert shown["guidance"]["reference"] == default["guidance"]["reference"]
+    assert shown["guidance"]["wn_radps"] == default["guidance"]["wn_radps"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _empty(guide: Path) -> None:
+    (guide / "empty.yaml").write_text("{}\n")
+
+
+# -- a stranger's law (row 11 of the issue's table) ----------------------------------------------------------------
+
+
+def test_a_strangers_law_of_25_lines_runs_replays_and_plots(tmp_path: Path) -> None:
+    for name in ("my_pd.py", "my-pd.yaml"):
+        (tmp_path / name).write_text((REPO / "docs" / "examples" / name).read_text())
+    assert len((tmp_path / "my_pd.py").read_text().splitlines()) <= 25
+    check, run, replay, plot = (command for command, _ in named("docs/GUIDE.md", "sh", "example").commands())
+    assert "valid" in shell(check, tmp_path)
+    assert shell(run, tmp_path).startswith("passed")
+    assert shell(replay, tmp_path).startswith("identical: 1200 ticks")
+    assert shell(plot, tmp_path).strip() == "runs/my-pd-001/plot.png"
+    picture = (tmp_path / "runs/my-pd-001/plot.png").read_bytes()
+    assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
+
+
+def test_the_guide_shows_the_examples_as_they_are() -> None:
+    for language, name in (("python", "my_pd.py"), ("yaml", "my-pd.yaml")):
+        assert named("docs/GUIDE.md", language, name).text == (REPO / "docs" / "examples" / name).read_text()
+
+
+# -- the README ----------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def readme_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The README's first command without its installation; in lockstep, which it says gives the same bytes."""
+    folder = tmp_path_factory.mktemp("readme")
+    install, run = readme_commands()[0].split(" && ")
+    assert install == "pip install ."
+    return folder, shell(run.replace("scaled:20", "lockstep"), folder)
+
+
+def readme_commands() -> list[str]:
+    return [command for block in blocks("README.md") if block.language == "sh" for command, _ in block.commands()]
+
+
+def test_the_readme_prints_what_the_program_prints(readme_run: tuple[Path, str]) -> None:
+    assert lasting(named("README.md", "text", "").text) == lasting(readme_run[1])
+
+
+def lasting(output: str) -> list[list[str]]:
+    """Words of every line, but for the time it took and the sha256, which depends on versions."""
+    return [re.split(r" s in |sha256", line)[0].split() for line in output.splitlines()]
+
+
+def test_the_readmes_other_commands_run(readme_run: tuple[Path, str]) -> None:
+    others = [command for command in readme_commands() if command.startswith("sil ")]
+    assert [command.split()[1] for command in others] == ["plot", "replay"]
+    assert "identical: 1200 ticks, 1 session" in [shell(command, readme_run[0]).strip() for command in others]
+
+
+def test_the_readmes_clock_is_accepted(tmp_path: Path) -> None:
+    """That all clocks give the same bytes is tests/e2e/test_same_bytes.py's."""
+    run = readme_commands()[0].split(" && ")[1] + " --set duration_s=20"
+    assert "--clock scaled:20" in run
+    assert shell(run, tmp_path, None).startswith(("passed", "degraded"))
+
+
+def test_make_check_is_a_target() -> None:
+    assert "make check" in readme_commands()
+    assert re.search(r"^check:", (REPO / "Makefile").read_text(), re.MULTILINE)
+
+
+# -- names ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_readmes_tree_names_what_exists() -> None:
+    tree = re.findall(r"^    (\S+)  +\S", (REPO / "README.md").read_text().split("## What is where")[1], re.MULTILINE)
+    assert len(tree) >= 10
+    assert [name for name in tree if not (REPO / name).exists()] == []
+    packages = {path.parent.name + "/" for path in REPO.glob("*/__init__.py")}
+    assert packages <= set(tree)
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_and_file_names_exist(document: Path) -> None:
+    text = document.read_text()
+    targets = [target.partition("#")[0] for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
+    assert [target for target in targets if target and not (document.parent / target).exists()] == []
+    files = re.findall(r"`((?:sil|protocol|firmware_sim|tests|tools|docs)/[\w./-]+)`", text)
+    assert [file for file in files if "NAME" not in file and not (REPO / file).exists()] == []
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_verbs_and_scenarios_exist(document: Path) -> None:
+    text = document.read_text()
+    verbs = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+    said = set(re.findall(r"(?:^|`)sil ([a-z]+)\b", text, re.MULTILINE))
+    assert said <= verbs
+    known = {entry.name for entry in list_scenarios()}
+    ran = set(re.findall(r"sil (?:run|plant|check) ([a-z][a-z0-9-]+)(?=[ `]|$)", text, re.MULTILINE))
+    assert ran - known <= {"no-such-scenario"}
+
+
+def test_every_verb_stands_in_the_readme_and_every_scenario_in_its_table() -> None:
+    readme, table = (REPO / "README.md").read_text(), (REPO / "docs/SCENARIOS.md").read_text()
+    verbs = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    assert [verb for verb in verbs if f"`{verb}`" not in readme] == []
+    assert [entry.name for entry in list_scenarios() if f"`{entry.name}`" not in table] == []
