@@ -40,10 +40,11 @@ def main(argv: list[str] | None = None) -> int:
         return _fail(str(error), EXIT_LINK)
     print(f"listening {link.url}", flush=True)
     port = Port(link)
+    board = Board(port, HostHal(port), user_law)
     try:
-        Board(port, HostHal(port), user_law).serve(once=options.once)
+        board.serve(once=options.once)
     except LinkClosed as error:
-        return 0 if options.once else _fail(str(error), EXIT_LINK)
+        return 0 if options.once or board.stopped else _fail(str(error), EXIT_LINK)
     except KeyboardInterrupt:
         return 0
     except Exception as error:

@@ -134,6 +134,7 @@ def replay(
             {
                 "identical": report.identical,
                 "ticks": report.ticks,
+                "law_file": report.law_file,
                 "config": [{"word": w, "recorded": a, "now": b} for w, a, b in report.config],
                 "first_difference": None
                 if first is None
@@ -141,6 +142,8 @@ def replay(
             }
         )
         return EXIT_OK if report.identical else EXIT_REQUIREMENT
+    if report.law_file:
+        print(report.law_file)
     for word, then, now in report.config:
         print(f"CONFIG differs: {word}: recorded {then}, now {now}")
     if report.first is None:

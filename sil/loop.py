@@ -20,6 +20,8 @@ from sil.clock import Clock
 from sil.commands import Acting, Decides
 from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
 
+LARGEST = 2**31 - 1
+
 
 class PlantBroke(Exception):
     """The plant's state is not a number at this tick."""
@@ -174,6 +176,5 @@ class Loop:
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:
     """(3,) SI values to wire integers, half to even, clipped to int32: a diverging run must not stop the wire."""
-    scaled = np.rint(values / unit).clip(-(2**31) + 1, 2**31 - 1)
-    x, y, z = scaled.astype(np.int64).tolist()
+    x, y, z = [round(min(max(value / unit, -LARGEST), LARGEST)) for value in values.tolist()]
     return x, y, z

@@ -7,6 +7,7 @@ a command that this board did not give. A changed parameter shows as a differenc
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 
 from protocol import events, frames
 from protocol.frames import Command, Tick, Type
-from protocol.law_tables import COMMON
+from protocol.law_tables import COMMON, ROW_WORDS, dequantise
 from protocol.links import LinkError
 from protocol.port import Port
 from sil.boards import BoardOrder, plug_in
@@ -42,11 +43,13 @@ class Difference(NamedTuple):
 
 @dataclass
 class Report:
-    """What a replay found. `config`: CONFIG words that differ, as (name, recorded, now)."""
+    """What a replay found. `config`: CONFIG words that differ, as (name, recorded, now), values in their
+    units."""
 
     ticks: int = 0
     sessions: int = 0
-    config: list[tuple[str, int, int]] = field(default_factory=list)
+    config: list[tuple[str, str, str]] = field(default_factory=list)
+    law_file: str = ""  # "" or what is to be said about a user's law whose file is not the recorded one
     first: Difference | None = None
 
     @property
@@ -64,7 +67,7 @@ def replay(
     """
     scenario = recorded_scenario(run, sets)
     made = law_orders(scenario)
-    report = Report()
+    report = Report(law_file=_changed_law(run, scenario))
     for session in _sessions(run):
         report.sessions += 1
         try:
@@ -84,6 +87,14 @@ def recorded_scenario(run: Run, sets: Iterable[str] = ()) -> Scenario:
     directory = Path(law_file).parent if law_file else Path()
     values = {**run.scenario, "clock": "lockstep", "link": "pty"}
     return load_values(values, tuple(sets), where=str(run.path), directory=directory)
+
+
+def _changed_law(run: Run, scenario: Scenario) -> str:
+    then = str(run.meta.get("law_file_sha256") or "")
+    file = user_law_spec(scenario).rpartition(":")[0]
+    if not then or hashlib.sha256(Path(file).read_bytes()).hexdigest() == then:
+        return ""
+    return f"{file}: not the law that flew: its file has changed since the run"
 
 
 class RecordedTick(NamedTuple):
@@ -217,20 +228,26 @@ def _answer(port: Port, tick: int, check_alive: Callable[[], None]) -> list[byte
 # -- reporting -----------------------------------------------------------------------------------------------------
 
 
-def config_differences(recorded: Iterable[bytes], made: Orders) -> list[tuple[str, int, int]]:
+def config_differences(recorded: Iterable[bytes], made: Orders) -> list[tuple[str, str, str]]:
     """CONFIG words that are not the recorded ones: (name, recorded, now)."""
     then: dict[int, int] = {}
     for packet in recorded:
         part = frames.unpack(packet).frame
         then.update(enumerate(part.words, start=part.offset))
-    names = [word.name for word in (*COMMON, *made.table.params)]
-    indices = sorted(set(then) | set(range(len(made.words))))
+    table = (*COMMON, *made.table.params)
+    named_then = {word.name: then.get(index, 0) for index, word in enumerate(table)}
+    named_now = {word.name: made.words[index] for index, word in enumerate(table)}
     differences = []
-    for index in indices:
-        now = made.words[index] if index < len(made.words) else 0
-        if then.get(index, 0) != now:
-            name = names[index] if index < len(names) else f"guidance word {index - len(names)}"
-            differences.append((name, then.get(index, 0), now))
+    for word in table:
+        if named_then[word.name] != named_now[word.name]:
+            old = dequantise(word, named_then[word.name], named_then)
+            new = dequantise(word, named_now[word.name], named_now)
+            differences.append((word.name, f"{old:.9g} {word.unit}".rstrip(), f"{new:.9g} {word.unit}".rstrip()))
+    rows_then = {index: value for index, value in then.items() if index >= len(table)}
+    rows_now = dict(enumerate(made.words[len(table) :], start=len(table)))
+    if rows_then != rows_now:
+        rows = f"{len(rows_then) // ROW_WORDS} rows", f"{len(rows_now) // ROW_WORDS} rows"
+        differences.append(("guidance rows", *rows) if rows[0] != rows[1] else ("guidance rows", rows[0], "other rows"))
     return differences
 
 

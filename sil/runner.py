@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from protocol import frames
+from protocol import events, frames
 from protocol.links import LinkError
 from sil.checks import check
 from sil.metrics import Judgement, judge, measure
@@ -34,6 +34,7 @@ from sil.trouble import (
     UsageError,
 )
 
+MANY_TICKS = 20_000  # whose log takes more than two seconds to seal
 NUMBERS_DEPEND_ON = ("numpy", "numba")
 
 
@@ -71,6 +72,8 @@ def run_scenario(
     with StopRequests() as stop:
         outcome = _fly(scenario, folder, recorder, stop, watch, wired)
         watch.stage("seal")
+        if outcome.ticks > MANY_TICKS:
+            watch.note(f"sealing the log of {outcome.ticks} ticks")
         report = seal(folder)
         summary = _summary(scenario, folder, outcome, report)
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
@@ -248,7 +251,8 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
     metrics |= {"crc_errors": link["crc_errors"], "discarded_bytes": link["discarded_bytes"]}
     judgements = judge(scenario.require, metrics) if outcome.reason in ("finished", "diverged") else []
     degraded = outcome.rig.loop.degraded_ticks if outcome.rig else 0
-    exit_code, verdict = _verdict(outcome, judgements, degraded, metrics)
+    not_a_number = sum(event.code in (events.NAN, events.PLANT_NAN) for event in run.events)
+    exit_code, verdict = _verdict(outcome, judgements, degraded, not_a_number)
     window = outcome.rig.window if outcome.rig else None
     return {
         "verdict": verdict,
@@ -261,6 +265,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "duration_s": outcome.ticks * scenario.period_ns * 1e-9,
         "metrics": _plain(metrics),
         "require": [_plain(judgement._asdict()) for judgement in judgements],
+        "not_a_number": not_a_number,
         "link": link,
         "timing": _timing(scenario, outcome, report),
         "reproducible": not (window.real_misses if window else 0),
@@ -270,10 +275,8 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
     }
 
 
-def _verdict(
-    outcome: Outcome, judgements: list[Judgement], degraded: int, metrics: Mapping[str, Any]
-) -> tuple[int, str]:
-    """The first line of DESIGN's table of exit codes that applies."""
+def _verdict(outcome: Outcome, judgements: list[Judgement], degraded: int, not_a_number: int) -> tuple[int, str]:
+    """The first line of the table of exit codes that applies; NaN anywhere is a failure, asked for or not."""
     if outcome.reason == "interrupted":
         return EXIT_INTERRUPTED, "interrupted"
     if outcome.failure:
@@ -281,7 +284,7 @@ def _verdict(
     if degraded:
         return EXIT_LINK, "degraded"
     expected = any(j.metric.startswith("diverged_at_s") for j in judgements)
-    if not all(j.passed for j in judgements) or (outcome.reason == "diverged" and not expected):
+    if not_a_number or not all(j.passed for j in judgements) or (outcome.reason == "diverged" and not expected):
         return EXIT_REQUIREMENT, "failed"
     return EXIT_OK, "passed"
 

@@ -105,8 +105,10 @@ def show_summary(summary: Mapping[str, Any]) -> None:
             table.add_row(label, *(_number(value, scale) for value in values), unit)
     console.print(table)
     for line in summary["require"]:
-        mark = "[green]met   [/]" if line["passed"] else "[red]missed[/]"
+        mark = "[green]met   [/]" if line["passed"] else "[red]failed[/]"
         console.print(f"{mark} {requirement_text(line)}")
+    if summary["not_a_number"]:
+        console.print(f"[red]failed[/] torque or plant was not a number, {summary['not_a_number']} times")
     if timing["degraded_ticks"]:
         late_ms = timing["wakeup_us"]["max"] / 1000
         woke = f"{timing['degraded_ticks']} of {summary['ticks']} ticks woke more than a period late"

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed, word_of
 from firmware_sim.controllers.gain import (
     learn_fixed,
     learn_float,
@@ -350,6 +350,7 @@ class Appc(CompiledLaw):
     """The law `appc` in the form of the configuration."""
 
     STATE = STATE
+    RANGES = ranges_of(APPC.telemetry)
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
@@ -394,4 +395,4 @@ class Appc(CompiledLaw):
             words = [word_of(s[f + i], unit) for f, unit in zip(fields, lsb, strict=True) for i in range(3)]
         else:
             words = [s[f + i] for f in fields for i in range(3)]
-        return limited(words, APPC.telemetry)
+        return self.in_range(words)

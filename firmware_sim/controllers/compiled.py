@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
 from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, div_trunc, shift_round
 from protocol.law_tables import AXES, FORM_FLOAT, Configuration, Word, refusal
 
+Ranges: TypeAlias = tuple[tuple[int, int], ...]
 Step = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], None]
 
 
@@ -44,11 +44,12 @@ def size(fields: Sequence[Field]) -> int:
 class CompiledLaw:
     """Base of pd, mrac and appc: `state` and `par` are int64 (fixed) or float64 arrays, `step` runs one function.
 
-    A law gives STATE, `functions` and `compiled` (float step, fixed step, as source and compiled), the parameters,
-    telemetry().
+    A law gives STATE, RANGES, `functions` and `compiled` (float step, fixed step, as source and compiled), the
+    parameters, telemetry().
     """
 
     STATE: ClassVar[tuple[Field, ...]]
+    RANGES: ClassVar[Ranges]  # of its telemetry words
     functions: ClassVar[tuple[Step, Step]]
     compiled: ClassVar[tuple[Step, Step]]
     has_model: ClassVar[bool] = True
@@ -92,6 +93,11 @@ class CompiledLaw:
         """Compile (or load) the step on copies; the law's state and all arguments stay as they are."""
         self._run(self.state.copy(), self.par, inp.copy(), ref.copy(), out.copy())
 
+    def in_range(self, words: Sequence[int]) -> list[int]:
+        """Telemetry words within the ranges of the law's table."""
+        pairs = zip(words, self.RANGES, strict=True)
+        return [low if word < low else high if word > high else word for word, (low, high) in pairs]
+
     def field(self, name: str) -> np.ndarray:
         """A view of one field of the state, in the form's own units."""
         index = [field.name for field in self.STATE].index(name)
@@ -106,13 +112,8 @@ def word_of(value: float, lsb: float) -> int:
     return round(min(max(value / lsb, INT32_MIN), INT32_MAX))
 
 
-def limited(words: Sequence[int], table: Sequence[Word]) -> list[int]:
-    """Telemetry words within the ranges of their table."""
-    return [int(min(max(value, low), high)) for value, (low, high) in zip(words, _ranges(table), strict=True)]
-
-
-@cache
-def _ranges(table: tuple[Word, ...]) -> tuple[tuple[int, int], ...]:
+def ranges_of(table: tuple[Word, ...]) -> Ranges:
+    """(lowest, highest) count of each word of a telemetry table."""
     scales = [2.0 ** int(word.q) for word in table]
     return tuple(
         (max(round(word.minimum * scale), INT32_MIN), min(round(word.maximum * scale), INT32_MAX))

@@ -31,8 +31,8 @@ from firmware_sim.controllers.compiled import (
     CompiledLaw,
     Field,
     LawRefuses,
-    limited,
     offsets,
+    ranges_of,
     torque_limits_fixed,
     word_of,
 )
@@ -323,6 +323,7 @@ class Mrac(CompiledLaw):
     """The law `mrac` in the form of the configuration."""
 
     STATE = STATE
+    RANGES = ranges_of(MRAC.telemetry)
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
@@ -375,4 +376,4 @@ class Mrac(CompiledLaw):
             words = [word_of(x, 2.0**-28) for x in theta] + [word_of(sum(f), 2.0**-16) for f in covariance]
         else:
             words = theta + [shift_round(sum(f), 4) for f in covariance]
-        return limited(words, MRAC.telemetry)
+        return self.in_range(words)

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, limited, offsets, torque_limits_fixed, word_of
+from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed, word_of
 from firmware_sim.fixed import clip, div_trunc, keep32, mul_q, norm_shift, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import NOW, wrap_pi
 from protocol.law_tables import AXES, PD, Configuration
@@ -97,6 +97,7 @@ class Pd(CompiledLaw):
     """The law `pd` in the form of the configuration."""
 
     STATE = STATE
+    RANGES = ranges_of(PD.telemetry)
     has_model = False
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
@@ -118,4 +119,4 @@ class Pd(CompiledLaw):
         words = self.state[ERROR : ERROR + 3].tolist()
         if self.is_float:
             words = [word_of(x, math.pi / 2**31) for x in words]
-        return limited(words, PD.telemetry)
+        return self.in_range(words)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import traceback
+
 from firmware_sim.board import Board, UserLawClass
 from firmware_sim.hal import HostHal
 from protocol.links import Link, inproc
 from protocol.port import Port
 from sil.boards import BoardOrder
-from sil.trouble import UsageError
+from sil.trouble import LinkFailure, UsageError
 
 
 class InprocBoard:
-    """A `firmware_sim` board that runs until idle whenever the laboratory waits for a frame. Lockstep only."""
+    """A `firmware_sim` board that runs until idle whenever the laboratory waits for a frame; its timer never fires."""
 
     def __init__(self, order: BoardOrder) -> None:
         lab_end, board_end = inproc.pair()
         self.link: Link = lab_end
         self._port = Port(board_end)
         self.board = Board(self._port, HostHal(self._port), _user_law(order.law_file))
+        self._log = order.log
         lab_end.pump = self._run_until_idle
 
     def check_alive(self) -> None:
@@ -31,8 +34,15 @@ class InprocBoard:
         self._port.close()
 
     def _run_until_idle(self) -> None:
-        while (packet := self._port.receive(0.0)) is not None:
-            self.board.handle(packet)
+        try:
+            while (packet := self._port.receive(0.0)) is not None:
+                self.board.handle(packet)
+        except Exception as error:
+            # What ends a board process ends this board, too: the traceback for the law's author, one line for the run.
+            if self._log is not None:
+                self._log.write_text(traceback.format_exc(), encoding="utf-8")
+            what = " ".join(str(error).split())[:200]
+            raise LinkFailure(f"board: the controller ended with {type(error).__name__}: {what}") from error
 
 
 def _user_law(law_file: str) -> UserLawClass | None:

@@ -11,8 +11,8 @@ class WiredBoard:
 
     def __init__(self, order: BoardOrder) -> None:
         self.link: Link = open_link(order.link_url, listen=False)
-        if order.link_url.startswith("pty"):
-            order.notify(f"waiting for a board on {self.link.peer_url}   (sil board --link {self.link.peer_url})")
+        board_url = self.link.peer_url or order.link_url
+        order.notify(f"waiting for a board on {board_url}   (sil board --link {board_url})")
 
     def check_alive(self) -> None:
         """Nothing of ours to look after: only its silence tells."""

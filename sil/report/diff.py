@@ -154,8 +154,9 @@ def _first_packet(a: Run, b: Run) -> tuple[int, PacketDifference | None]:
     """(equal frames before it, the first difference)."""
     laws = _law_of(a), _law_of(b)
     rows = [[row for row in run.packets if row.type != _CONFIG_TYPE] for run in (a, b)]
+    after = [sum(row.type == _CONFIG_TYPE for row in run.packets) for run in (a, b)]
     for count, (x, y) in enumerate(zip_longest(*rows)):
-        if x == y:
+        if x is not None and y is not None and _counted(x, after[0]) == _counted(y, after[1]):
             continue
         if x is not None and y is not None and _place(x) != _place(y):
             x, y = (x, None) if _place(x) < _place(y) else (None, y)  # the earlier one is missing in the other run
@@ -176,8 +177,14 @@ def _config(a: Run, b: Run) -> list[tuple[str, Any, Any]]:
     return [pair for pair in pairs if pair[1] != pair[2]]
 
 
-def _place(row: PacketRow) -> tuple[int, bool, int, int]:
-    return row.tick, row.direction == "down", row.type, row.sequence
+def _counted(row: PacketRow, config_parts: int) -> tuple[Any, ...]:
+    """A frame to compare: its number is counted from the end of CONFIG, whose parts may be more in one of the runs."""
+    sequence = (row.sequence - config_parts) & 0xFFFF if row.direction == "up" else row.sequence
+    return row.tick, row.direction, row.type, sequence, row.fate, row.packet[:2], row.packet[4:-4], row.encoded
+
+
+def _place(row: PacketRow) -> tuple[int, bool, int]:
+    return row.tick, row.direction == "down", row.type
 
 
 def _compared(

@@ -137,7 +137,7 @@ def _torque(ax: Axes, run: Run) -> None:
     for i in range(3):
         _line(ax, run.t_s, run.command_Nm[:, i] * factor, color=COLOURS[i], lw=0.8, alpha=0.35, step=True)
         _line(ax, run.t_s, run.applied_Nm[:, i] * factor, color=COLOURS[i], lw=1.2, step=True)
-    _limits(ax, run, factor)
+    _limits(ax, _near_limits(run, (0, 1, 2)), factor)
     _finish(ax, "torque", unit, "Torque on the body", zero=True)
     _focus(ax, run.applied_Nm * factor)
     _legend(ax, _torque_key(run))
@@ -147,6 +147,7 @@ def _momentum(ax: Axes, run: Run) -> None:
     factor, unit = _scaled(run.momentum_Nms, "N m s")
     for i in range(3):
         _line(ax, run.t_s, run.momentum_Nms[:, i] * factor, color=COLOURS[i], lw=1.5)
+    _limits(ax, _near_limits(run, (0, 1, 2), "momentum_max_Nms", "momentum_Nms"), factor)
     _finish(ax, "momentum", unit, "Wheel momentum", zero=True)
 
 
@@ -174,7 +175,7 @@ def _torque_of_axis(ax: Axes, run: Run, i: int) -> None:
     factor, unit = _scaled(run.applied_Nm, "N m")
     _line(ax, run.t_s, run.command_Nm[:, i] * factor, color=FAINT, lw=1.0, step=True)
     _line(ax, run.t_s, run.applied_Nm[:, i] * factor, color=COLOURS[i], lw=1.3, step=True)
-    _limits(ax, run, factor, (i,))
+    _limits(ax, _near_limits(run, (i,)), factor)
     _finish(ax, "torque", unit, "", zero=True)
     _focus(ax, run.applied_Nm[:, i] * factor)
 
@@ -326,20 +327,21 @@ def _torque_key(run: Run) -> list[Line2D]:
     return key
 
 
-def _limits(ax: Axes, run: Run, factor: float, axes: Sequence[int] = (0, 1, 2)) -> None:
-    """The wheels' torque limit, where the torque comes near it."""
-    for value in _near_limits(run, axes):
+def _limits(ax: Axes, limits: Array, factor: float) -> None:
+    """The wheels' limits, as lines on both sides of zero."""
+    for value in limits:
         for sign in (-1, 1):
             ax.axhline(sign * value * factor, color=INK, lw=0.9, ls="-.")
 
 
-def _near_limits(run: Run, axes: Sequence[int]) -> Array:
-    wheels = (run.scenario.get("actuators") or {}).get("wheels") or {}
-    limits = wheels.get("torque_max_Nm")
-    if limits is None or not np.isfinite(run.applied_Nm).any():
+def _near_limits(run: Run, axes: Sequence[int], key: str = "torque_max_Nm", name: str = "applied_Nm") -> Array:
+    """Limits actuators.wheels.`key` of these axes, where the values `name` come near them."""
+    limits = ((run.scenario.get("actuators") or {}).get("wheels") or {}).get(key)
+    values = run[name]
+    if limits is None or not np.isfinite(values).any():
         return np.empty(0)
     chosen = np.unique(np.broadcast_to(np.asarray(limits, float), 3)[list(axes)])
-    return np.asarray(chosen[chosen < 2.0 * np.nanmax(np.abs(run.applied_Nm))])
+    return np.asarray(chosen[chosen < 2.0 * np.nanmax(np.abs(values))])
 
 
 def _focus(ax: Axes, applied: Array) -> None:

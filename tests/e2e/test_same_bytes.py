@@ -111,7 +111,7 @@ def test_replay_of_other_laws_is_identical(tmp_path, law):
 
 def test_a_changed_parameter_is_reported_and_differs(recorded):
     report = replay(open_run(recorded), ["law.params.c2_pole=0.7"])
-    assert [name for name, _, _ in report.config] == ["c2_pole"]
+    assert report.config == [("c2_pole", "0.8", "0.7")]
     assert report.first is not None
     assert report.first.tick == 0
     assert "COMMAND tick=0" in decoded(report.first.replayed)
@@ -146,6 +146,41 @@ def test_a_board_that_adds_one_lsb_at_tick_700_is_found_at_700(recorded, monkeyp
     first = replay(open_run(recorded)).first
     assert first is not None
     assert first.tick == 700
+
+
+def test_a_users_law_that_was_edited_since_is_named(tmp_path):
+    law = tmp_path / "law.py"
+    text = "class L:\n    PARAMS = {}\n    def init(self, p): pass\n    def step(self, s): return (%s, 0.0, 0.0)\n"
+    law.write_text(text % "1e-3")
+    (tmp_path / "s.yaml").write_text("law: {name: ./law.py:L, form: float}\nduration_s: 10\nboard: inproc\n")
+    run_scenario(load_scenario(tmp_path / "s.yaml"), tmp_path / "run")
+    same = replay(open_run(tmp_path / "run"))
+    assert same.identical
+    assert same.law_file == ""
+    law.write_text(text % "2e-3")
+    edited = replay(open_run(tmp_path / "run"))
+    assert edited.first is not None
+    assert "has changed" in edited.law_file
+
+
+def test_not_a_number_anywhere_is_a_failure(tmp_path):
+    (tmp_path / "law.py").write_text(
+        "class L:\n    PARAMS = {}\n    def init(self, p): pass\n"
+        "    def step(self, s): return (float('nan') if s.tick == 5 else 0.0, 0.0, 0.0)\n"
+    )
+    (tmp_path / "s.yaml").write_text("law: {name: ./law.py:L, form: float}\nduration_s: 10\nboard: inproc\n")
+    summary = run_scenario(load_scenario(tmp_path / "s.yaml"), tmp_path / "run")
+    assert (summary["verdict"], summary["exit_code"], summary["not_a_number"]) == ("failed", 1, 1)
+
+
+def test_diff_looks_through_another_number_of_config_parts(tmp_path):
+    from sil.report.diff import diff
+
+    short = ["duration_s=10", "board=inproc"]
+    for name, extra in (("a", []), ("b", ["guidance.profile=hold"])):
+        run_scenario(load_scenario("appc-rs232", ["require=[]", *short, *extra]), tmp_path / name)
+    found = diff(open_run(tmp_path / "a"), open_run(tmp_path / "b"))
+    assert found.packet is None or found.packet.tick > 0
 
 
 def test_replay_of_a_run_without_a_board_says_so(tmp_path):
