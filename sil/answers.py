@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from protocol import frames
+from protocol import events, frames
 from protocol.channel import TO_BOARD, TO_LAB, Channel, Fate
 from protocol.frames import Command, Packet, Sample, Tick, Type
 from protocol.port import Port
@@ -51,11 +51,10 @@ class Answers:
         self._should_use: set[int] = set()  # ticks whose SAMPLE the board has in time, by the model
         self._early: list[Packet] = []  # answers to ticks that are still to come: the board's own timer was faster
         self._sent_wall_ns = 0
-        self._heard_wall_ns = time.monotonic_ns()
+        self._advanced_wall_ns = time.monotonic_ns()
         self.answer_ns: list[int] = []
         self.last_answer_ns = NO_ANSWER
-        self.duplicates = 0
-        self.overruns = 0
+        self.strays = 0  # frames that belong to no answer under way: repeated, too old, too far ahead; dropped
         self._sample_size = 0  # bytes on the wire
 
     # -- up ------------------------------------------------------------------------------------------------------
@@ -96,17 +95,12 @@ class Answers:
 
     def drain(self, tick: int) -> None:
         """Lockstep: wait until the whole answer to `tick` is here. Real time: take what has come by now."""
-        if not self._lockstep:
-            while (packet := self._port.receive(0.0)) is not None:
-                self._take(packet)
-            self._watch_silence()
+        if self._lockstep:
+            self._await(tick)
             return
-        while self._complete < tick or self._followers:
-            packet = self._port.receive(LOOK_EVERY_S)
-            if packet is not None:
-                self._take(packet)
-            else:
-                self._watch_silence()
+        while (packet := self._port.receive(0.0)) is not None:
+            self._take(packet)
+        self._watch_silence()
 
     def listen(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` for a frame and take it; what a paced clock does between ticks."""
@@ -114,66 +108,84 @@ class Answers:
         if packet is not None:
             self._take(packet)
 
-    def finish(self, tick: int) -> None:
-        """The last answer; one that the clock has not brought by now counts like any real miss."""
-        self.drain(tick)
-        if self._complete < tick:
-            self._window.unanswered(tick)
+    def finish(self, tick: int, overdue: bool) -> None:
+        """The last answer that counts. `overdue`: its tick is over, so one that is not here by now is a real miss.
+
+        It is waited for all the same: a board that never gives it is dead, and the run has failed.
+        """
+        if not self._lockstep:
+            self.drain(tick)
+            if overdue and self._complete < tick:
+                self._window.unanswered(tick)
+        self._await(tick)
+
+    def _await(self, tick: int) -> None:
+        while self._complete < tick or self._followers:
+            packet = self._port.receive(LOOK_EVERY_S)
+            if packet is not None:
+                self._take(packet)
+            self._watch_silence()
 
     def _watch_silence(self) -> None:
-        """Wall limits only detect a dead peer; they never decide a byte."""
-        silent_s = (time.monotonic_ns() - self._heard_wall_ns) * 1e-9
-        if silent_s < LOOK_EVERY_S:
+        """Wall limits only detect a dead peer, they decide no byte. Only what advances an answer ends a silence."""
+        silent_s = (time.monotonic_ns() - max(self._advanced_wall_ns, self._sent_wall_ns)) * 1e-9
+        if silent_s < LOOK_EVERY_S or (self._complete >= self._tick and not self._followers):
             return
         self._check_alive()
-        if self._complete < self._tick and silent_s > self._dead_after_s:
-            raise LinkFailure(f"board: no answer to tick {self._complete + 1} within {self._dead_after_s:g} s")
+        if silent_s > self._dead_after_s:
+            missing = f"{self._followers} frames too few of the answer to" if self._followers else "no answer to"
+            tick = self._complete if self._followers else self._complete + 1
+            raise LinkFailure(f"board: {missing} tick {tick} in {self._dead_after_s:g} s")
 
     def _take(self, packet: Packet) -> None:
-        self._heard_wall_ns = time.monotonic_ns()
         kind = packet.type
         if kind in ANSWERS and packet.tick > self._tick:
             if len(self._early) < EARLY_LIMIT:
                 self._early.append(packet)
             else:
-                self.duplicates += 1
+                self.strays += 1
         elif kind == Type.COMMAND:
             self._command(packet)
         elif kind in (Type.TELEMETRY, Type.EVENT):
             self._follower(packet)
         elif kind == Type.HELLO and not packet.frame.flags & frames.HELLO_ECHO:
+            self._recorder.event(max(self._tick, 0), events.BOARD_RESTARTED, max(self._tick, 0), 0)
             raise LinkFailure(f"board: restarted after tick {self._complete} (it says HELLO unasked)")
-        else:
-            self._recorder.housekeeping(self._tick, Direction.DOWN, packet.raw)
 
     def _command(self, packet: Packet) -> None:
         command: Command = packet.frame
         tick = command.tick
         if tick <= self._complete or tick not in self._done_ns:
-            self.duplicates += 1
+            self.strays += 1
             return
+        if self._followers:
+            self._window.incomplete(self._complete)
+        now_ns = self._advanced_wall_ns = time.monotonic_ns()
         self._complete, self._followers = tick, command.follows
         if command.used in (frames.PROPAGATED, frames.REPEATED) and tick in self._should_use:
             self._window.board_was_faster(tick)
         if tick == self._tick:
-            self.last_answer_ns = self._heard_wall_ns - self._sent_wall_ns
+            self.last_answer_ns = now_ns - self._sent_wall_ns
             self.answer_ns.append(self.last_answer_ns)
-        x, y, z = command.torque
-        unit = self._torque_Nm
         fate = self._fate(packet)
         if not fate.delivered:
             self._window.lost(tick)
             self._recorder.packet(tick, Direction.DOWN, Outcome.DROPPED, packet.raw)
             return
+        x, y, z = command.torque
+        unit = self._torque_Nm
         in_time = self._window.arrive(tick, (x * unit, y * unit, z * unit), fate.arrival_ns)
         self._recorder.packet(tick, Direction.DOWN, Outcome.DELIVERED if in_time else Outcome.LATE, packet.raw)
 
     def _follower(self, packet: Packet) -> None:
-        self._followers = max(0, self._followers - 1)
-        delivered = self._fate(packet).delivered
-        self._recorder.packet(
-            packet.tick, Direction.DOWN, Outcome.DELIVERED if delivered else Outcome.DROPPED, packet.raw
-        )
+        """TELEMETRY or EVENT of the answer under way."""
+        if packet.tick != self._complete or not self._followers:
+            self.strays += 1
+            return
+        self._followers -= 1
+        self._advanced_wall_ns = time.monotonic_ns()
+        outcome = Outcome.DELIVERED if self._fate(packet).delivered else Outcome.DROPPED
+        self._recorder.packet(packet.tick, Direction.DOWN, outcome, packet.raw)
 
     def _fate(self, packet: Packet) -> Fate:
         sent_ns = self._done_ns.get(packet.tick, 0)

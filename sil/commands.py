@@ -12,6 +12,7 @@ from protocol import events
 from protocol.frames import FRESH, HELD, NO_TICK, ZERO
 
 Torque = tuple[float, float, float]
+LATE_ON_THE_CLOCK, BOARD_FASTER, INCOMPLETE = 0, 1, 2  # b of event REAL_MISS
 
 
 class Acting(NamedTuple):
@@ -84,18 +85,18 @@ class CommandWindow:
         In time by the model, yet after its tick was decided, is a real miss: the run is no longer reproducible.
         """
         in_time = self._delay == 0 or arrival_ns < (tick + self._delay) * self._period_ns
-        decided = tick <= self._decided
+        decided = tick <= self._decided or tick in self._unexplained
         self._unexplained.discard(tick)
         if in_time and not decided:
             self._arrived[tick] = torque_Nm
             return True
         if in_time:
-            self._real_misses += 1
-            self.notices.append((events.REAL_MISS, tick, 0))
+            self._real_miss(tick, LATE_ON_THE_CLOCK)
             return False
         late_us = (arrival_ns - (tick + self._delay) * self._period_ns) // 1000
         self.late += 1
-        self._explained.add(tick)
+        if not decided:
+            self._explained.add(tick)
         self.notices.append((events.COMMAND_LATE, tick, min(late_us, 2**31 - 1)))
         return False
 
@@ -106,8 +107,15 @@ class CommandWindow:
 
     def board_was_faster(self, tick: int) -> None:
         """The board's own timer stepped `tick`, though by the model its SAMPLE was there in time: the clock's fault."""
+        self._real_miss(tick, BOARD_FASTER)
+
+    def incomplete(self, tick: int) -> None:
+        """Frames that COMMAND(tick) announced never came: what is recorded of this tick is not what the board sent."""
+        self._real_miss(tick, INCOMPLETE)
+
+    def _real_miss(self, tick: int, why: int) -> None:
         self._real_misses += 1
-        self.notices.append((events.REAL_MISS, tick, 1))
+        self.notices.append((events.REAL_MISS, tick, why))
 
     def lost(self, tick: int) -> None:
         """The link dropped COMMAND(tick): a miss of the scenario's own making."""

@@ -77,7 +77,7 @@ class Loop:
         self._timing(k - 1)
         acting = self.commands.decide(k - delay) if delay else self.commands.acting  # (2)
         motion = self.plant.motion(t_ns)
-        if not math.isfinite(sum(motion.euler_rad.tolist())):
+        if not is_finite(motion):
             raise PlantBroke(k)
         applied = self._limited(acting, motion)
         self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
@@ -95,7 +95,7 @@ class Loop:
         self.clock.start(first * self.timing.period_ns)
         for k in range(first, self.timing.ticks):
             if stop():
-                self.board.drain(k - 1)
+                self.board.finish(k - 1, overdue=False)
                 return self._ended(k, "interrupted")
             self._await_tick(k)
             try:
@@ -105,11 +105,14 @@ class Loop:
                 return self._ended(k, "diverged")
             progress(k, motion)
             if self._beyond(k, motion):
-                self.board.drain(k)
-                return self._ended(k + 1, "diverged")
-        self._await_tick(self.timing.ticks)
-        self.board.finish(self.timing.ticks - 1)
-        return self._ended(self.timing.ticks, "finished")
+                return self._last(k, "diverged")
+        return self._last(self.timing.ticks - 1, "finished")
+
+    def _last(self, k: int, reason: str) -> tuple[int, str]:
+        """Tick k was the last one: its command would act from the next on, and is waited for until then."""
+        self._await_tick(k + 1)
+        self.board.finish(k, overdue=True)
+        return self._ended(k + 1, reason)
 
     def _ended(self, ticks: int, reason: str) -> tuple[int, str]:
         self._timing(ticks - 1)
@@ -172,6 +175,11 @@ class Loop:
         for code, a, b in self.commands.notices:
             self.recorder.event(k, code, a, b)
         self.commands.notices.clear()
+
+
+def is_finite(motion: Motion) -> bool:
+    """No part of the motion is infinite or not a number."""
+    return math.isfinite(sum(sum(part.tolist()) for part in motion[1:]))
 
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:

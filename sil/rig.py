@@ -34,6 +34,7 @@ from sil.trouble import LinkFailure, UsageError
 from sil.unplugged import Nobody, Scheduled
 
 Notify = Callable[[str], None]
+TYPE_AT = 1  # of a packet
 HELLO_WITHIN_S = 10.0
 WIRED_WITHIN_S = 60.0  # a person types the other command
 DEAD_AFTER_S = 10.0
@@ -118,7 +119,7 @@ def _with_board(
     rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made)  # type: ignore[arg-type]
     try:
         # The plant compiles or loads while the board process starts and does the same.
-        rig.port = Port(host.link)
+        rig.port = Port(host.link, tap=_housekeeping_to(recorder))
         rig.session = Session(rig.port, clock_rate_q16(clock), host.check_alive)
         loop = _loop(scenario, clock, Nobody(), window, recorder, made)
         packets = rig.session.open(
@@ -141,6 +142,16 @@ def record_config(rig: Rig, recorder: Recorder, tick: int) -> None:
     """The CONFIG packets are deterministic frames: part of the log, at the tick where their session starts."""
     for packet in rig.config_packets:
         recorder.packet(tick, Direction.UP, Outcome.DELIVERED, packet)
+
+
+def _housekeeping_to(recorder: Recorder) -> Callable[[str, bytes], None]:
+    """The recorder's tap: HELLO, READY, TICK, TIMING, STOP; the deterministic frames come with their fate."""
+
+    def tap(way: str, packet: bytes) -> None:
+        if frames.is_housekeeping(packet[TYPE_AT]):
+            recorder.housekeeping(Direction.UP if way == "tx" else Direction.DOWN, packet)
+
+    return tap
 
 
 def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel) -> Answers:

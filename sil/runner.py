@@ -34,6 +34,7 @@ from sil.trouble import (
     UsageError,
 )
 
+PORT_COUNTERS = ("crc_errors", "discarded_bytes", "unknown", "sequence_gaps", "duplicates", "strangers")
 MANY_TICKS = 20_000  # whose log takes more than two seconds to seal
 NUMBERS_DEPEND_ON = ("numpy", "numba")
 
@@ -63,14 +64,14 @@ def run_scenario(
     """
     watch = watch or Watch()
     refuse_hopeless(scenario)
-    folder = new_run_dir(scenario.name, out)
+    folder, made = new_run_dir(scenario.name, out)
     try:
         journal = Journal(folder / "run.journal")
     except JournalError as error:
         raise UsageError(str(error)) from None
     recorder = JournalRecorder(journal)
     with StopRequests() as stop:
-        outcome = _fly(scenario, folder, recorder, stop, watch, wired)
+        outcome = _fly(scenario, folder, made, recorder, stop, watch, wired)
         watch.stage("seal")
         if outcome.ticks > MANY_TICKS:
             watch.note(f"sealing the log of {outcome.ticks} ticks")
@@ -78,6 +79,8 @@ def run_scenario(
         summary = _summary(scenario, folder, outcome, report)
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
         (folder / "summary.json").write_text(text, encoding="utf-8")
+    if outcome.error is not None:
+        raise outcome.error  # not foreseen: with its traceback, after everything was saved
     return summary
 
 
@@ -95,6 +98,7 @@ class Outcome:
         self.ticks = 0
         self.reason = "failed"
         self.failure = ""
+        self.error: Exception | None = None
         self.wall_s = 0.0
         self.start_s = 0.0
         self.rig: Rig | None = None
@@ -103,6 +107,7 @@ class Outcome:
 def _fly(
     scenario: Scenario,
     folder: Path,
+    made: bool,
     recorder: JournalRecorder,
     stop: StopRequests,
     watch: Watch,
@@ -115,7 +120,7 @@ def _fly(
     try:
         rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note, wired)
     except BaseException:
-        _discard(folder, recorder)
+        _discard(folder, made, recorder)
         raise
     stop.hold()
     recorder.start(identity(scenario, rig), host_facts(scenario, rig))
@@ -129,10 +134,13 @@ def _fly(
         watch.tick(tick, scenario.ticks, motion)
 
     try:
-        outcome.ticks, outcome.reason = rig.loop.run(stop.asked, show)
+        _, outcome.reason = rig.loop.run(stop.asked, show)
     except (LinkError, LinkFailure, JournalError) as error:
-        outcome.failure, outcome.ticks = _why(rig, error), rig.loop.ticks_done
+        outcome.failure = _why(rig, error)
+    except Exception as error:
+        outcome.failure, outcome.error = f"{type(error).__name__}: {error}", error
     finally:
+        outcome.ticks = rig.loop.ticks_done
         outcome.wall_s = time.perf_counter() - began
         rig.stop({"finished": frames.STOP_DONE, "interrupted": frames.STOP_INTERRUPTED}.get(outcome.reason, 2))
         _close(recorder, outcome)
@@ -151,14 +159,14 @@ def _close(recorder: JournalRecorder, outcome: Outcome) -> None:
         outcome.failure = outcome.failure or str(error)
 
 
-def _discard(folder: Path, recorder: JournalRecorder) -> None:
-    """Nothing was run: leave no half-made directory behind (a board's last words stay, if there are any)."""
+def _discard(folder: Path, made: bool, recorder: JournalRecorder) -> None:
+    """Nothing was run: leave nothing half-made behind (a board's last words stay, if there are any)."""
     recorder.close()
     (folder / "run.journal").unlink(missing_ok=True)
     log = folder / "board.log"
     if log.exists() and not log.stat().st_size:
         log.unlink()
-    if not any(folder.iterdir()):
+    if made and not any(folder.iterdir()):
         folder.rmdir()
 
 
@@ -213,17 +221,18 @@ def host_facts(scenario: Scenario, rig: Rig) -> dict[str, Any]:
 # -- run directory -------------------------------------------------------------------------------------------------
 
 
-def new_run_dir(name: str, out: Path | None) -> Path:
-    """`out`, made if it is not there and refused if it is not empty; or the next free runs/NAME-NNN."""
+def new_run_dir(name: str, out: Path | None) -> tuple[Path, bool]:
+    """(`out`, made if it is not there and refused if it is not empty; or the next free runs/NAME-NNN; whether made)."""
     try:
         if out is None:
-            return _next_run_dir(Path("runs"), name)
+            return _next_run_dir(Path("runs"), name), True
+        made = not out.exists()
         out.mkdir(parents=True, exist_ok=True)
         if any(out.iterdir()):
             raise UsageError(f"--out: expected an empty or new directory, got {out}: it is not empty")
     except OSError as error:
         raise UsageError(f"run directory: cannot make {error.filename or out}: {error.strerror}") from None
-    return out
+    return out, made
 
 
 def _next_run_dir(parent: Path, name: str) -> Path:
@@ -297,8 +306,8 @@ def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int
         "late": metrics["late"],
         "real_misses": rig.window.real_misses if rig is not None and rig.window is not None else 0,
         "overruns": metrics["overruns"],
-        "crc_errors": counters.crc_errors if counters is not None else 0,
-        "discarded_bytes": counters.discarded_bytes if counters is not None else 0,
+        **{name: getattr(counters, name, 0) for name in PORT_COUNTERS},
+        "strays": rig.answers.strays if rig is not None and rig.answers is not None else 0,
     }
 
 

@@ -17,6 +17,9 @@ from sil.trouble import LinkFailure
 
 HELLO_EVERY_S = 0.2
 CONFIG_EVERY_S = 2.0
+TELL_EVERY_S = 10.0
+READY_WITHIN_S = 300.0  # a law may take its time to compile on a slow machine; nobody compiles for longer
+RESTARTS = 3
 BUILD = "sil 0.1"
 
 _T = TypeVar("_T")
@@ -41,13 +44,15 @@ class Session:
 
         Raises LinkFailure: nobody answers, another protocol or layout, a refused word, another table.
         """
-        while True:
+        for _ in range(RESTARTS):
             self._greet(within_s)
             self._port.reset()
             packets = [self._port.pack(part) for part in config.split(words)]
             ready = self._configure(packets, notify)
             if ready is not None:
                 break
+        else:
+            raise LinkFailure(f"board: it restarted {RESTARTS} times while it was configured")
         if ready.table_hash != table_hash:
             raise LinkFailure(
                 f"board: READY with table {ready.table_hash:08x}, expected {table_hash:08x}: "
@@ -92,8 +97,8 @@ class Session:
 
         None: the board says HELLO unasked, so it was restarted and knows nothing of this session.
         """
-        told = False
-        while True:
+        began = time.monotonic()
+        while (waited_s := time.monotonic() - began) < READY_WITHIN_S:
             self._port.write(*packets)
             answer = self._await(CONFIG_EVERY_S, self._is_ready_or_restart)
             if isinstance(answer, Ready):
@@ -101,9 +106,11 @@ class Session:
             if answer is not None:
                 return None
             self._check_alive()
-            if not told:
+            if waited_s < CONFIG_EVERY_S:
                 notify("the board is compiling its law (first run only)")
-                told = True
+            elif waited_s % TELL_EVERY_S < CONFIG_EVERY_S:
+                notify(f"still waiting for the board to be ready: {waited_s:.0f} s")
+        raise LinkFailure(f"board: not ready within {READY_WITHIN_S:g} s")
 
     @staticmethod
     def _is_ready_or_restart(packet: Packet) -> Ready | Hello | None:

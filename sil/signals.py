@@ -69,8 +69,8 @@ class Counterpart(Protocol):
     def listen(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` for one frame and take it."""
 
-    def finish(self, tick: int) -> None:
-        """The run is over: the answer to `tick` is the last one that counts."""
+    def finish(self, tick: int, overdue: bool) -> None:
+        """The run is over: the answer to `tick` is the last one that counts; `overdue`: it should be here by now."""
 
 
 class Recorder(Protocol):
@@ -79,8 +79,8 @@ class Recorder(Protocol):
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         """A deterministic frame, header to CRC; direction and fate as in sil.sinks.journal."""
 
-    def housekeeping(self, tick: int, direction: int, packet: bytes) -> None:
-        """A frame outside every comparison; it is stamped with the host's time."""
+    def housekeeping(self, direction: int, packet: bytes) -> None:
+        """A frame outside every comparison; it is stamped with the host's time and filed under the present tick."""
 
     def event(self, tick: int, code: int, a: int, b: int) -> None:
         """Something the laboratory noticed; codes in protocol.events."""

@@ -40,5 +40,5 @@ class Nobody:
     def listen(self, timeout_s: float) -> None:
         """Nothing comes."""
 
-    def finish(self, tick: int) -> None:
+    def finish(self, tick: int, overdue: bool) -> None:
         """Nothing is missing."""

@@ -37,7 +37,7 @@ class InprocBoard:
         try:
             while (packet := self._port.receive(0.0)) is not None:
                 self.board.handle(packet)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             # What ends a board process ends this board, too: the traceback for the law's author, one line for the run.
             if self._log is not None:
                 self._log.write_text(traceback.format_exc(), encoding="utf-8")

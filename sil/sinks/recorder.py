@@ -16,6 +16,7 @@ class JournalRecorder:
 
     def __init__(self, target: Journal) -> None:
         self._journal = target
+        self._tick = 0  # the tick under way
 
     def start(self, meta: Mapping[str, Any], host: Mapping[str, Any]) -> None:
         """What decides the numbers, and apart from it what describes this machine and link."""
@@ -29,9 +30,9 @@ class JournalRecorder:
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         self._journal.add(Kind.PACKET, tick, journal.packet_payload(direction, fate, packet))
 
-    def housekeeping(self, tick: int, direction: int, packet: bytes) -> None:
+    def housekeeping(self, direction: int, packet: bytes) -> None:
         payload = journal.housekeeping_payload(direction, time.monotonic_ns(), packet)
-        self._journal.add(Kind.HOUSEKEEPING, max(tick, 0), payload)
+        self._journal.add(Kind.HOUSEKEEPING, self._tick, payload)
 
     def event(self, tick: int, code: int, a: int, b: int) -> None:
         self._journal.add(Kind.LAB_EVENT, tick, journal.event_payload(code, a, b))
@@ -47,6 +48,7 @@ class JournalRecorder:
         self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns, answer_ns))
 
     def commit(self, tick: int) -> None:
+        self._tick = tick
         self._journal.commit(tick)
 
     def end(self, tick: int, reason: str, ticks: int) -> None:

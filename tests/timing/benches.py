@@ -137,12 +137,13 @@ class Rows:
         self.events: list[tuple[int, int, int, int]] = []
         self.truths: list[tuple[int, tuple[float, ...], int]] = []
         self.commits: list[int] = []
+        self.kept_house: list[tuple[int, bytes]] = []
 
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         self.packets.append((tick, direction, fate, packet))
 
-    def housekeeping(self, tick: int, direction: int, packet: bytes) -> None:
-        pass
+    def housekeeping(self, direction: int, packet: bytes) -> None:
+        self.kept_house.append((direction, packet))
 
     def event(self, tick: int, code: int, a: int, b: int) -> None:
         self.events.append((tick, code, a, b))
