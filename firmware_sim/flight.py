@@ -6,6 +6,7 @@ All times are counted in simulated nanoseconds from tick numbers, so every clock
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,7 +15,7 @@ from firmware_sim import controllers
 from firmware_sim.controllers import inputs
 from firmware_sim.guidance.reference import Reference
 from protocol import events, frames
-from protocol.frames import NO_TICK, Command, Event, Reading, Sample, Telemetry
+from protocol.frames import Command, Event, Sample, Telemetry
 from protocol.law_tables import FORM_FLOAT, Configuration, LawTable, parse_configuration, refusal
 
 INT32_MAX = 2**31 - 1
@@ -51,8 +52,11 @@ class Flight:
         reason = refusal(configuration)
         if reason is not None:
             raise FlightRefused(reason)
+        self._free_at_ns = 0
+        self._lost = self._overruns = self._dropped = self._saturations = 0
+        self._pending: list[Event] = []
+        self._begin()
         self._warm_up()
-        self._begin(0)
 
     def _new_law(self, configuration: Configuration) -> controllers.Law:
         if self._user_class is not None:
@@ -60,17 +64,14 @@ class Flight:
         return controllers.new_law(self._table.name, configuration)
 
     def _warm_up(self) -> None:
-        """Compile and allocate on a copy: the next SAMPLE is answered in time, and the flight state is untouched."""
-        self._begin(0)
-        quaternion = Reading(0, (2**30, 0, 0, 0))
-        zero = (0, 0, 0)
-        readings = (Reading(0, zero), quaternion, Reading(0, zero))
-        for tick in range(3):
-            self.step(tick, Sample(tick, zero, zero, zero, NO_TICK, 0, frames.ZERO, 7, readings))
-        self.step(3, None)
+        """Compile on copies: the next SAMPLE is answered in time, and the flight state is untouched."""
+        inp = self._inp.copy()
+        inp[inputs.FRESH] = 1
+        copy.deepcopy(self._reference).advance(inp)
+        self._law.warm_up(inp, self._reference.state, self._out)
 
-    def _begin(self, first_tick: int) -> None:
-        """Fresh law, reference and counters; what a start and a bumpless re-start have in common."""
+    def _begin(self) -> None:
+        """Fresh law, reference and watchdog; what a start and a bumpless re-start have in common."""
         common = self._configuration.common
         try:
             self._law = self._new_law(self._configuration)
@@ -87,10 +88,7 @@ class Flight:
         self._good_run = 0
         self._since_sample = 0
         self._watchdog = False
-        self._free_at_ns = 0
-        self._first_tick = first_tick
-        self._lost = self._overruns = self._dropped = self._saturations = 0
-        self._pending: list[Event] = []
+        self._arithmetic = False
 
     # -- what the main loop calls --------------------------------------------------------------------------------
 
@@ -101,12 +99,13 @@ class Flight:
             self._pending.append(Event(tick, events.STALE_SAMPLE, tick & 0x7FFFFFFF, self._dropped))
 
     def restart(self, expected: int, tick: int) -> None:
-        """Bumpless re-start: the gap is too long to propagate; law and reference begin anew at the next reading."""
-        counters = (self._lost, self._overruns, self._dropped, self._saturations)
-        self._begin(tick)
-        self._lost, self._overruns, self._dropped, self._saturations = counters
+        """Bumpless re-start: the gap is too long to propagate; law and reference begin anew at the next reading.
+
+        Counters, the model of busy time and events that wait for the next answer stay.
+        """
+        self._begin()
         self._restarted = True
-        self._pending.append(Event(tick, events.RESTARTED, expected, tick))
+        self._pending.insert(0, Event(tick, events.RESTARTED, expected, tick))  # first: never one too many
 
     _restarted = False
 
@@ -187,22 +186,27 @@ class Flight:
         if restarted or self._law.reference_restarted:
             notices.append(Event(tick, events.REFERENCE_RESTART, 7, int(restarted)))
         flags = int(self._out[3])
-        torque = self._to_wire(self._out, notices, tick) if self._float else tuple(self._out[:3].tolist())
+        arithmetic = bool(flags & frames.FLAG_ARITHMETIC)
+        if arithmetic and not self._arithmetic:
+            notices.append(Event(tick, events.ARITHMETIC_SATURATION, tick, 0))
+        self._arithmetic = arithmetic
+        torque = self._to_wire(notices, tick)
         limited = tuple(max(-m, min(m, u)) for u, m in zip(torque, self._limits, strict=True))
         if limited != torque:
             flags |= frames.FLAG_SATURATED
         self._saturations += bool(flags & frames.FLAG_SATURATED)
         return limited, flags  # type: ignore[return-value]
 
-    def _to_wire(self, out: np.ndarray, notices: list[Event], tick: int) -> tuple[int, int, int]:
-        values = []
-        for axis, u in enumerate(out[:3].tolist()):
-            if u != u:
+    def _to_wire(self, notices: list[Event], tick: int) -> tuple[int, ...]:
+        """The law's torque in the wire's LSB; 0 where it is not a number."""
+        values = self._out[:3].tolist()
+        for axis, u in enumerate(values):
+            if u != u or u == inputs.NOT_A_NUMBER:
                 notices.append(Event(tick, events.NAN, axis, 0))
-                u = 0.0
-            scaled = u / self._torque_unit
-            values.append(round(max(-INT32_MAX, min(INT32_MAX, scaled))))
-        return values[0], values[1], values[2]
+                values[axis] = 0
+        if self._float:
+            return tuple(round(max(-INT32_MAX, min(INT32_MAX, u / self._torque_unit))) for u in values)
+        return tuple(values)
 
     def _watch(self, tick: int, heard: bool, notices: list[Event]) -> int:
         """Link watchdog: after link_limit ticks without a SAMPLE the command is zero, until the next SAMPLE."""

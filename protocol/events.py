@@ -17,9 +17,6 @@ REFERENCE_RESTART = 0x0007
 ARITHMETIC_SATURATION = 0x0008
 NAN = 0x0009
 READING_INVALID = 0x000A
-IDENTIFICATION_PAUSED = 0x000B
-IDENTIFICATION_RESUMED = 0x000C
-LAW_ERROR = 0x000D
 
 COMMAND_LATE = 0x0100
 COMMAND_MISSED = 0x0101
@@ -27,13 +24,9 @@ HOLD_LIMIT = 0x0102
 RECOVERED = 0x0103
 REAL_MISS = 0x0104
 PLANT_NAN = 0x0105
-TORQUE_LIMIT = 0x0106
-MOMENTUM_LIMIT = 0x0107
 EPOCH_REBASED = 0x0108
 BOARD_RESTARTED = 0x0109
 DIVERGED = 0x010A
-FRAME_LOST = 0x010B
-UNEXPECTED_FRAME = 0x010C
 
 FIRST_LAB_CODE = 0x0100
 
@@ -61,28 +54,27 @@ _KINDS = (
     EventKind(
         ARITHMETIC_SATURATION,
         "ARITHMETIC_SATURATION",
-        "a fixed-point operation of the law saturated",
-        "axis mask, 0 unknown",
-        "so far",
+        "an operation of the law saturates from here (COMMAND's flag bit 3 rose)",
+        "tick",
+        "",
     ),
     EventKind(NAN, "NAN", "the law's torque was not a number; it is zero", "axis 0, 1, 2", ""),
     EventKind(READING_INVALID, "READING_INVALID", "a reading the law needs is invalid", "needed mask", "valid"),
-    EventKind(IDENTIFICATION_PAUSED, "IDENTIFICATION_PAUSED", "identification stands still", "tick", ""),
-    EventKind(IDENTIFICATION_RESUMED, "IDENTIFICATION_RESUMED", "three good samples: it goes on", "tick", ""),
-    EventKind(LAW_ERROR, "LAW_ERROR", "the law raised an error; the command is zero", "tick", ""),
     EventKind(COMMAND_LATE, "COMMAND_LATE", "a COMMAND came after its tick, dropped", "its tick", "us late"),
     EventKind(COMMAND_MISSED, "COMMAND_MISSED", "no command in time for this tick", "its tick", "misses in a row"),
-    EventKind(HOLD_LIMIT, "HOLD_LIMIT", "held too long: zero torque", "tick of the last command", "misses in a row"),
+    EventKind(HOLD_LIMIT, "HOLD_LIMIT", "held too long: zero torque", "tick of the missed command", "misses in a row"),
     EventKind(RECOVERED, "RECOVERED", "a good command after misses", "its tick", "misses before it"),
-    EventKind(REAL_MISS, "REAL_MISS", "late on the clock though in time by the model", "tick", "us late"),
+    EventKind(
+        REAL_MISS,
+        "REAL_MISS",
+        "missed on the clock though in time by the model",
+        "tick",
+        "why (0 COMMAND late on the clock, 1 the board's timer was faster, 2 answer incomplete)",
+    ),
     EventKind(PLANT_NAN, "PLANT_NAN", "the plant's state is not a number", "tick", ""),
-    EventKind(TORQUE_LIMIT, "TORQUE_LIMIT", "actuator torque at its limit", "axis mask", "ticks so far"),
-    EventKind(MOMENTUM_LIMIT, "MOMENTUM_LIMIT", "wheel momentum at its limit", "axis mask", "ticks so far"),
     EventKind(EPOCH_REBASED, "EPOCH_REBASED", "woke more than a period late: the epoch moved", "tick", "us"),
     EventKind(BOARD_RESTARTED, "BOARD_RESTARTED", "the board answered with HELLO within a session", "tick", ""),
     EventKind(DIVERGED, "DIVERGED", "attitude beyond the scenario's bound", "axis 0, 1, 2", "angle in 1e-3 deg"),
-    EventKind(FRAME_LOST, "FRAME_LOST", "the channel model lost or damaged a frame", "frame type", "tick"),
-    EventKind(UNEXPECTED_FRAME, "UNEXPECTED_FRAME", "a frame out of place in this state", "frame type", "its tick"),
 )
 
 EVENTS = {kind.code: kind for kind in _KINDS}

@@ -3,6 +3,7 @@
 Per tick the board gets what it got then (the SAMPLE, or TICK where none reached it in time), and its COMMAND, TELEMETRY
 and EVENT frames are held against the recorded ones. It stops at the first difference, since every later sample answers
 a command that this board did not give. A changed parameter shows as a difference of CONFIG, which is reported apart.
+A tick without a recorded answer is a difference, too, but for the last ones of a run that did not finish.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from protocol import events, frames
-from protocol.frames import Command, Tick, Type
+from protocol.frames import Command, Config, Event, Tick, Type
 from protocol.law_tables import COMMON, ROW_WORDS, dequantise
 from protocol.links import LinkError
 from protocol.port import Port
@@ -28,7 +29,7 @@ from sil.scenario import Scenario, load_values
 from sil.session import Session
 from sil.trouble import LinkFailure, UsageError
 
-DELIVERED, LATE = "delivered", "late"
+DELIVERED = "delivered"
 ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
 LOOK_EVERY_S = 0.25
 
@@ -83,6 +84,8 @@ def recorded_scenario(run: Run, sets: Iterable[str] = ()) -> Scenario:
     """The scenario that the log carries, with overrides; a user's own law is looked for where the run found it."""
     if run.scenario.get("board") == "none" or not any(row.type == Type.SAMPLE for row in run.packets):
         raise UsageError(f"{run.path}: no board took part in this run: there is nothing to replay")
+    if not any(row.type == Type.COMMAND for row in run.packets):
+        raise UsageError(f"{run.path}: no COMMAND in this log: the board never answered, there is nothing to replay")
     law_file = run.summary.get("law_file") or ""
     directory = Path(law_file).parent if law_file else Path()
     values = {**run.scenario, "clock": "lockstep", "link": "pty"}
@@ -98,12 +101,14 @@ def _changed_law(run: Run, scenario: Scenario) -> str:
 
 
 class RecordedTick(NamedTuple):
-    """One tick of the log: the SAMPLE as sent, whether the board stepped on it, and the answer frames in order."""
+    """One tick of the log: the SAMPLE as sent and the answer frames in order."""
 
     tick: int
     sample: bytes | None
-    used: bool
+    used: bool  # the board stepped on the SAMPLE
+    stale: bool  # the SAMPLE came, but after the board's own timer
     answer: tuple[bytes, ...]
+    open_end: bool  # the run ended before the answer: none is expected
 
 
 class RecordedSession(NamedTuple):
@@ -115,36 +120,49 @@ class RecordedSession(NamedTuple):
 
 def _sessions(run: Run) -> Iterator[RecordedSession]:
     starts = run.sessions or [0]
+    unfinished = run.end.get("reason") != "finished"
+    last_answer = max(row.tick for row in run.packets if row.direction == "down" and row.type in ANSWERS)
     for number, start in enumerate(starts):
         stop = starts[number + 1] if number + 1 < len(starts) else None
         rows = [row for row in run.packets if row.tick >= start and (stop is None or row.tick < stop)]
         config = tuple(row.packet for row in rows if row.type == Type.CONFIG)
-        ticks = tuple(_recorded(tick, list(group)) for tick, group in groupby(rows, key=lambda row: row.tick))
+        ticks = tuple(
+            _recorded(tick, list(group), open_end=unfinished and tick > last_answer)
+            for tick, group in groupby(rows, key=lambda row: row.tick)
+        )
         yield RecordedSession(config, tuple(tick for tick in ticks if tick.sample is not None))
 
 
-def _recorded(tick: int, rows: list[PacketRow]) -> RecordedTick:
+def _recorded(tick: int, rows: list[PacketRow], open_end: bool) -> RecordedTick:
     sample = next((row for row in rows if row.type == Type.SAMPLE), None)
     answer = tuple(row.packet for row in rows if row.direction == "down" and row.type in ANSWERS)
     ordered = tuple(sorted(answer, key=lambda packet: int.from_bytes(packet[2:4], "little")))
-    used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
-    return RecordedTick(tick, sample.packet if sample else None, used, ordered)
+    came, stepped = sample is not None and sample.fate == DELIVERED, _stepped_without(ordered)
+    return RecordedTick(
+        tick, sample.packet if sample else None, came and not stepped, came and stepped, ordered, open_end
+    )
 
 
 def _stepped_without(answer: tuple[bytes, ...]) -> bool:
     """The board's own timer was first: it propagated, though neither an overrun nor an invalid reading made it."""
-    if not answer:
-        return False
-    try:
-        command: Command = frames.unpack(answer[0]).frame
-    except frames.BadPacket:
+    command = _frame(answer[0]) if answer else None
+    if not isinstance(command, Command):
         return False
     own_timer = command.used in (frames.PROPAGATED, frames.REPEATED) and not command.flags & frames.FLAG_OVERRUN
     return own_timer and not any(_is_invalid_reading(packet) for packet in answer)
 
 
 def _is_invalid_reading(packet: bytes) -> bool:
-    return packet[1] == Type.EVENT and frames.unpack(packet).frame.code == events.READING_INVALID
+    frame = _frame(packet)
+    return isinstance(frame, Event) and frame.code == events.READING_INVALID
+
+
+def _frame(packet: bytes) -> Any:
+    """The frame of a recorded packet; None where it is damaged."""
+    try:
+        return frames.unpack(packet).frame
+    except frames.BadPacket:
+        return None
 
 
 # -- into the board ------------------------------------------------------------------------------------------------
@@ -166,6 +184,8 @@ def _replay_session(
         talk.open(made.words, made.configuration.hash, HELLO_WITHIN_S, lambda line: None)
         report.config = config_differences(session.config, made)
         for recorded in session.ticks:
+            if recorded.open_end:
+                break
             report.first = _replay_tick(port, recorded, host.check_alive)
             if report.first is not None:
                 return
@@ -179,23 +199,18 @@ def _replay_session(
 def _replay_tick(port: Port, recorded: RecordedTick, check_alive: Callable[[], None]) -> Difference | None:
     assert recorded.sample is not None
     if recorded.used:
+        if _frame(recorded.sample) is None:
+            raise UsageError(f"tick {recorded.tick}: its SAMPLE is damaged in the log: {decoded(recorded.sample)}")
         port.write(recorded.sample)
     else:
         port.send(Tick(recorded.tick))
     answer = _answer(port, recorded.tick, check_alive)
-    if not recorded.used and _reached(recorded):
+    if recorded.stale:
         port.write(recorded.sample)  # it came after its tick was stepped: the board counts and drops it
-    if not recorded.answer:
-        return None  # the log ends before the answer
     for expected, got in _side_by_side(recorded.answer, answer):
         if expected != got:
             return Difference(recorded.tick, expected, got)
     return None
-
-
-def _reached(recorded: RecordedTick) -> bool:
-    """A delivered SAMPLE that the board's timer was faster than."""
-    return bool(recorded.answer) and _stepped_without(recorded.answer)
 
 
 def _side_by_side(recorded: tuple[bytes, ...], replayed: list[bytes]) -> Iterator[tuple[bytes | None, bytes | None]]:
@@ -229,10 +244,12 @@ def _answer(port: Port, tick: int, check_alive: Callable[[], None]) -> list[byte
 
 
 def config_differences(recorded: Iterable[bytes], made: Orders) -> list[tuple[str, str, str]]:
-    """CONFIG words that are not the recorded ones: (name, recorded, now)."""
+    """CONFIG words that are not the recorded ones: (name, recorded, now); one line where a packet is damaged."""
     then: dict[int, int] = {}
     for packet in recorded:
-        part = frames.unpack(packet).frame
+        part = _frame(packet)
+        if not isinstance(part, Config):
+            return [("CONFIG", f"damaged: {decoded(packet)}", "whole")]
         then.update(enumerate(part.words, start=part.offset))
     table = (*COMMON, *made.table.params)
     named_then = {word.name: then.get(index, 0) for index, word in enumerate(table)}

@@ -24,13 +24,6 @@ METRICS: dict[str, tuple[str, ...]] = {
 WALL = ("wall_s", "seal_s", "times_real_time", "wakeup_us", "answer_us", "timing")
 
 
-def metric_names() -> list[str]:
-    """Every name that `require` knows."""
-    return [f"{name}.{part}" for name, parts in METRICS.items() for part in parts] + [
-        name for name, parts in METRICS.items() if not parts
-    ]
-
-
 def refused_metric(metric: str) -> str | None:
     """What was expected instead of `metric`, or None if it is one."""
     name, dot, part = metric.partition(".")

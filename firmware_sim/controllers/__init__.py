@@ -30,6 +30,9 @@ class Law(Protocol):
     def step(self, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
         """One tick: `inp` and `out` as in inputs.py, `ref` the state of guidance.reference after its advance()."""
 
+    def warm_up(self, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+        """Compile what step() needs, without a trace in the law or the arguments."""
+
     def telemetry(self) -> list[int]:
         """The law's TELEMETRY words, in the order of its table."""
 

@@ -1,7 +1,8 @@
 """What a law is given at a tick and what it gives back: indices of the arrays `inp` and `out`.
 
 `inp` is int64 in wire units (fixed form) or float64 in SI units (float form); si_scale() takes one to the other.
-`out` is [torque x, y, z, flags]: torque on the body in the wire's LSB (fixed) or N m (float), within the law's limits.
+`out` is [torque x, y, z, flags]: torque on the body in the wire's LSB (fixed) or N m (float), within the law's limits;
+NOT_A_NUMBER or NaN where the law has none.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ READINGS = (EULER, QUATERNION, RATE)
 I_EULER, I_QUATERNION, I_RATE, I_APPLIED, I_MOMENTUM, I_SETPOINT = 3, 6, 10, 13, 16, 19
 
 OUT_FLAGS = 3
-OUT_SIZE = 4
+NOT_A_NUMBER = -(2**63)  # a torque in out of the fixed form that is not a number; NaN in the float form
 # Flags of out, the same bits as COMMAND's.
 SATURATED, IDENTIFICATION_PAUSED, ARITHMETIC, STARTING = 1 << 0, 1 << 2, 1 << 3, 1 << 5
 

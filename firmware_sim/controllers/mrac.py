@@ -71,7 +71,6 @@ STATE = (
 # Parameters of both forms; fixed: c1, c2 Q28, the others Q30, mantissas and shifts as in kinematics.py.
 PRINTED, C1, C2, KAPPA, KAPPA_INV, FORGETTING, FORGETTING_INV, TRACE_MAX, DECOUPLE, IDENTIFY, TORQUE_SHIFT = range(11)
 LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT, B0_MIN, B0_MAX = 11, 14, 17, 20, 23, 26, 29
-PARAMETERS = 32
 
 STEPS_MAX = 1000000
 TURN = 2.0 * math.pi

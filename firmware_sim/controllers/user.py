@@ -2,11 +2,12 @@
 
     class MyLaw:
         PARAMS = {"kp": (0.02, "N m/rad", 1e-6)}        # name: (default, unit, lsb); may be left out
-        def init(self, params): ...                     # once before tick 0; params: {name: float}
+        def init(self, params): ...                     # once before its first step(); params: {name: float}
         def step(self, sample): return torque           # every tick; three numbers, N m, on the body
 
 Without a reading the law is not asked: its last command is repeated and COMMAND says so. With MODEL = True in the class
-step() is called all the same; then sample.fresh is False and the readings are NaN, never stale.
+step() is called all the same; then sample.fresh is False and the readings are NaN, never stale. No made-up
+sample warms it up; a bumpless re-start (SPEC B8) flies a new object. A torque of NaN is sent as 0, with event NAN.
 """
 
 from __future__ import annotations
@@ -152,6 +153,9 @@ class UserLaw:
         out[:3] = self._command if self._is_float else self._wire(out)
         out[inputs.OUT_FLAGS] = 0 if self._started else inputs.STARTING
 
+    def warm_up(self, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+        """Nothing: a user's law may keep count of its calls, and cannot be copied."""
+
     def telemetry(self) -> list[int]:
         """No words of its own."""
         return []
@@ -185,8 +189,11 @@ class UserLaw:
         return torque
 
     def _wire(self, out: np.ndarray) -> np.ndarray:
-        limited = np.clip(np.nan_to_num(self._command) / self._torque_unit, -(2**31) + 1, 2**31 - 1)
-        return np.rint(limited).astype(out.dtype)
+        missing = np.isnan(self._command)
+        counts = np.where(missing, 0.0, self._command) / self._torque_unit
+        wire = np.rint(np.clip(counts, -(2**31) + 1, 2**31 - 1)).astype(out.dtype)
+        wire[missing] = inputs.NOT_A_NUMBER
+        return wire
 
     def _call(self, what: str, function: Any, *arguments: object) -> Any:
         try:

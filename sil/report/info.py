@@ -14,7 +14,6 @@ from sil import mcap_file
 from sil.metrics import judge, measure
 from sil.runs import Run
 
-_AXES = ("roll", "pitch", "yaw")
 _TYPES = {1: "CONFIG", 2: "SAMPLE", 3: "COMMAND", 4: "TELEMETRY", 5: "EVENT"}
 
 
@@ -57,7 +56,7 @@ def text(content: Mapping[str, Any]) -> str:
         _row("sampling", f"{content['period_s']:g} s"),
         _row("seed", content["seed"]),
     ]
-    lines += [_row(key, _short(value)) for key, value in content["identity"].items()]
+    lines += [_row(key, _short(value)) for key, value in content["identity"].items() if value not in (None, "", {})]
     lines += [_row("sha256", content["sha256"]), "", _heading("roll", "pitch", "yaw")]
     lines += [_metric(name, value) for name, value in content["metrics"].items()]
     lines += _block("requirements", [_required(line) for line in content["require"]])

@@ -5,16 +5,8 @@ from __future__ import annotations
 from protocol import events
 from protocol.events import EVENTS
 
-ERRORS = frozenset((events.NAN, events.LAW_ERROR, events.PLANT_NAN, events.DIVERGED, events.BOARD_RESTARTED))
-NOTES = frozenset(
-    (
-        events.WATCHDOG_OFF,
-        events.REFERENCE_RESTART,
-        events.IDENTIFICATION_PAUSED,
-        events.IDENTIFICATION_RESUMED,
-        events.RECOVERED,
-    )
-)
+ERRORS = frozenset((events.NAN, events.PLANT_NAN, events.DIVERGED, events.BOARD_RESTARTED))
+NOTES = frozenset((events.WATCHDOG_OFF, events.REFERENCE_RESTART, events.RECOVERED))
 OF_THE_HOST = frozenset((events.EPOCH_REBASED,))  # caused by this machine's clock alone: they go to timing.mcap
 
 

@@ -212,7 +212,6 @@ class HousekeepingLayout:
 
 
 HOUSEKEEPING = HousekeepingLayout()
-FIXED = {layout.name: layout for layout in (TRUTH, SAMPLE, COMMAND, EVENT, SESSION, TIMING)}
 
 
 def telemetry(law: str, words: Sequence[tuple[str, str]]) -> Layout:

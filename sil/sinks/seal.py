@@ -34,7 +34,7 @@ from sil.sinks.mcap_rows import RunRows, TimingRows
 
 LIBRARY = "attitude-sil"
 CHUNK_BYTES = 256 * 1024  # the grain of seeking in a viewer
-REORDER_TICKS = 64  # a record may be journalled this many ticks after the tick it belongs to
+REORDER_TICKS = 512  # a record may be journalled this many ticks late: twice what sil.answers remembers
 TRUNCATED = "truncated"  # the `end` reason of a run whose journal has no END
 LIBRARIES = ("mcap", "lz4", "foxglove-schemas-protobuf", "protobuf", "numpy")
 _TO_TIMING = frozenset((Kind.HOST, Kind.TIMING, Kind.HOUSEKEEPING))
@@ -56,6 +56,7 @@ class SealReport(NamedTuple):
     damage: str  # "" or where and why reading the journal stopped
     left_out: str  # "" or which incomplete ticks are missing
     undecoded: int  # packets that `frames.unpack` refused; they are in /packet/* all the same
+    too_late: int  # records journalled more than REORDER_TICKS late: left out, for the log never goes back in time
     messages: int
     wall_s: float
 
@@ -88,6 +89,7 @@ def seal(run_dir: str | os.PathLike[str]) -> SealReport:
         reader.damage,
         sealing.left_out,
         sealing.run.undecoded,
+        sealing.too_late,
         sealing.run.messages,
         time.perf_counter() - started,
     )
@@ -110,13 +112,16 @@ class _Target:
         return self._file
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is None:
-            self._file.flush()
-            os.fsync(self._file.fileno())
-        self._file.close()
-        if kind is None:
-            os.replace(self._partial, self._path)
-        else:
+        try:
+            try:
+                if kind is None:
+                    self._file.flush()
+                    os.fsync(self._file.fileno())
+            finally:
+                self._file.close()  # on a full disk it raises, too: what is still buffered has no room either
+            if kind is None:
+                os.replace(self._partial, self._path)
+        finally:
             self._partial.unlink(missing_ok=True)
 
 
@@ -130,8 +135,9 @@ class _Sealing:
         self.timing = TimingRows(self._writers[1])
         self._period_ns = 0
         self._end: dict[str, Any] = {}
-        self._last_truth = -1
+        self._last_truth = self._written = -1  # newest tick with a truth; newest tick in the files
         self.left_out = ""
+        self.too_late = 0
 
     @property
     def complete(self) -> bool:
@@ -156,6 +162,9 @@ class _Sealing:
                 session_tick = tick
             if tick == 0xFFFFFFFF:  # a frame that belongs to no tick: its session's first
                 tick = session_tick
+            if tick <= self._written:
+                self.too_late += 1
+                continue
             waiting.setdefault(tick, []).append(record)
             if tick > newest:
                 newest = tick
@@ -190,6 +199,7 @@ class _Sealing:
         if not self._period_ns:
             raise SealError(f"{self._reader.path}: expected META before tick {tick}")
         t_ns = tick * self._period_ns
+        self._written = tick
         for_run: list[Record] = []
         for_timing: list[Record] = []
         for record in records:
