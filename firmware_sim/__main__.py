@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import ctypes
 import os
 import signal
 import sys
 import traceback
+from typing import IO
 
 PR_SET_PDEATHSIG = 1
 EXIT_LINK = 3
@@ -19,6 +21,7 @@ def main(argv: list[str] | None = None) -> int:
     options = _parser().parse_args(argv)
     if options.parent:
         _die_with(options.parent)
+    stdout = _take_stdout()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
 
     from firmware_sim.board import Board
@@ -38,7 +41,8 @@ def main(argv: list[str] | None = None) -> int:
         link = open_link(options.link, listen=True)
     except LinkError as error:
         return _fail(str(error), EXIT_LINK)
-    print(f"listening {link.url}", flush=True)
+    with contextlib.suppress(OSError), stdout:  # nobody has to read it
+        print(f"listening {link.url}", file=stdout)
     port = Port(link)
     board = Board(port, HostHal(port), user_law)
     try:
@@ -71,6 +75,23 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
     return parser
+
+
+def _take_stdout() -> IO[str]:
+    """Standard output for its one line, "listening URL"; file descriptor 1 is standard error from here on.
+
+    So a law may print, while it is loaded and in flight: its text comes before no "listening", and fills no pipe that
+    nobody reads after that line. A stream that was closed takes what is written and forgets it.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # the lowest free number: this one
+    stdout = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    sys.stdout = sys.stderr
+    return stdout
 
 
 def _die_with(parent: int) -> None:

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, EXIT_USAGE, SilError
+from sil import streams
+from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, EXIT_USAGE, SilError, UsageError
 
 if TYPE_CHECKING:
     from sil.runner import Watch
@@ -50,6 +51,7 @@ LinkOption = Annotated[
 OutOption = Annotated[
     Path | None, typer.Option("--out", help="Run directory; refused if not empty. Default: runs/NAME-NNN.")
 ]
+REPLAY_BOARDS = ("inproc", "process")
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, for programs.")]
 
 
@@ -78,8 +80,13 @@ def run(
 def plant(
     scenario: ScenarioArgument,
     link: Annotated[
-        str, typer.Option("--link", metavar="URL", help="pty, udp://HOST:PORT of the board, or serial://PATH.")
-    ] = "pty",
+        str | None,
+        typer.Option(
+            "--link",
+            metavar="URL",
+            help="pty, udp://HOST:PORT of the board, or serial://PATH. Default: the scenario's.",
+        ),
+    ] = None,
     clock: ClockOption = None,
     set_: SetOption = None,
     out: OutOption = None,
@@ -126,7 +133,10 @@ def replay(
     """Feed a run's recorded packets to a fresh board: identical answers, or the first difference, decoded."""
     from sil.replay import decoded
     from sil.replay import replay as replay_run
+    from sil.scenario_errors import one_of
 
+    if board not in REPLAY_BOARDS:
+        raise UsageError(f"--board: expected {one_of(REPLAY_BOARDS, board)}, got {board!r}")
     report = replay_run(_open(run_dir), set_ or (), board)
     if as_json:
         first = report.first
@@ -255,6 +265,7 @@ def recover(run_dir: Annotated[Path, typer.Argument(metavar="RUN", help="Directo
 
 def main(argv: list[str] | None = None) -> None:
     """Entry point: maps every expected failure to one line on stderr and its exit code."""
+    streams.settle()
     sys.exit(invoke(argv))
 
 
@@ -262,13 +273,12 @@ def invoke(argv: list[str] | None = None) -> int:
     """Run one command; returns the exit code of DESIGN's table."""
     command = typer.main.get_command(app)
     try:
-        return int(command.main(args=argv, prog_name="sil", standalone_mode=False) or EXIT_OK)
+        code = int(command.main(args=argv, prog_name="sil", standalone_mode=False) or EXIT_OK)
+        sys.stdout.flush()
+        return code
     except KeyboardInterrupt:
         print("interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return EXIT_OK
     except Exception as error:
         return _explained(error)
 

@@ -99,7 +99,7 @@ class ProcessBoard:
         )
 
     def _listening(self) -> str:
-        """The URL the child says it listens on, from its first line."""
+        """The URL the child says it listens on: its one line, after which its standard output is its standard error."""
         child = self._child
         assert child is not None and child.stdout is not None
         poller = select.poll()
@@ -108,9 +108,8 @@ class ProcessBoard:
             raise LinkFailure(f"board: the controller process did not start within {START_S:g} s")
         line = child.stdout.readline().decode(errors="replace").strip()
         if not line.startswith("listening "):
-            child.wait(STOP_S)
-            self.check_alive()
-            raise LinkFailure(f"board: the controller process said {line!r}, expected 'listening URL'")
+            said = f"board: the controller process said {line!r}, expected 'listening URL'"
+            raise LinkFailure(self.post_mortem(LinkFailure(said)))
         return line.removeprefix("listening ")
 
     def _last_words(self) -> str:
