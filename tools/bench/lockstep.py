@@ -3,8 +3,10 @@
     python -m tools.bench.lockstep [--repeats 5] [--scenario appc-rs232] [--json]
 
 A: a whole `sil run` in lockstep over a pty (both processes, plant, law, journal), its wall time divided by its ticks.
-B: a child that answers N bytes with M bytes by os.read and os.write alone, median of the exchanges. Both processes of
-either are placed by the kernel. Trust the ratio, not the absolute figures: they are the machine's.
+B: a child that answers N bytes with M bytes by os.read and os.write alone, median of the exchanges. Both pairs of
+processes are pinned alike, once to two CPUs (`split`, what two processes get by themselves when the machine is idle), once
+to one (`same`): placement alone changes a bare exchange by a factor of three. Trust the ratio, not the absolute
+figures: they are the machine's.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import tty
 from pathlib import Path
@@ -26,7 +29,7 @@ from protocol.frames import Type
 from sil.runs import Run
 
 EXTRA = 3  # COBS and the two zeros
-WARM_UP = 100
+WARM_UP = 200
 
 CHILD = """
 import os, sys, tty
@@ -47,6 +50,37 @@ while True:
 """
 
 
+PLACEMENTS = {"split": (0, 1), "same": (0, 0)}
+
+
+class Placed:
+    """While it lasts, this process runs on one CPU and every child it starts on another (or the same) one."""
+
+    def __init__(self, placement: str) -> None:
+        self._own, self._childs = PLACEMENTS[placement]
+        self._over = threading.Event()
+
+    def __enter__(self) -> Placed:
+        self._before = os.sched_getaffinity(0)
+        os.sched_setaffinity(0, {self._own})
+        self._thread = threading.Thread(target=self._pin_children, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._over.set()
+        self._thread.join()
+        os.sched_setaffinity(0, self._before)
+
+    def _pin_children(self) -> None:
+        """Until a child is found; then the thread is gone and disturbs nothing."""
+        children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
+        while not self._over.wait(0.02):
+            for pid in map(int, children.read_text().split()):
+                os.sched_setaffinity(pid, {self._childs})
+                return
+
+
 def ping_pong_us(up: int, down: int, exchanges: int) -> float:
     """Median of one exchange, up bytes there and down bytes back, in us."""
     master, slave = pty.openpty()
@@ -54,6 +88,7 @@ def ping_pong_us(up: int, down: int, exchanges: int) -> float:
     child = subprocess.Popen([sys.executable, "-c", CHILD, os.ttyname(slave), str(up), str(down)])
     try:
         os.read(master, 1)
+        time.sleep(0.05)  # until the child is on its CPU
         request, times = bytes(up), []
         for _ in range(exchanges + WARM_UP):
             began = time.perf_counter_ns()
@@ -89,36 +124,42 @@ def main() -> None:
     parser.add_argument("--scenario", default="appc-rs232")
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
-    rows = []
+    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in PLACEMENTS}
     with tempfile.TemporaryDirectory() as folder:
         run = one_run(options.scenario, Path(folder) / "warm")
         up, down = frame_sizes(run)
         for repeat in range(options.repeats):
-            run = one_run(options.scenario, Path(folder) / str(repeat))
-            timing = run.summary["timing"]
-            ours = timing["wall_s"] / run.summary["ticks"] * 1e6
-            rows.append((ours, ping_pong_us(up, down, len(run)), timing["times_real_time"], timing["seal_s"]))
-    ratios = [ours / bare for ours, bare, _, _ in rows]
-    result = {
-        "scenario": options.scenario,
-        "bytes_up": up,
-        "bytes_down": down,
-        "ratio_median": statistics.median(ratios),
-        "ratio_spread": [min(ratios), max(ratios)],
-        "tick_us_median": statistics.median(row[0] for row in rows),
-        "ping_pong_us_median": statistics.median(row[1] for row in rows),
-        "times_real_time_median": statistics.median(row[2] for row in rows),
-        "seal_s_median": statistics.median(row[3] for row in rows),
-    }
+            for name in PLACEMENTS:
+                rows[name].append(one_pair(options.scenario, Path(folder) / f"{name}{repeat}", name, up, down))
+    results = {name: summary(pairs) for name, pairs in rows.items()}
     if options.json:
-        print(json.dumps(result, indent=2))
+        print(json.dumps({"scenario": options.scenario, "bytes_up": up, "bytes_down": down, **results}, indent=2))
         return
     print(f"{options.scenario}: {up} bytes up, {down} bytes down per tick, {options.repeats} repeats, interleaved")
-    print(f"{'':14}{'sil us/tick':>12}{'ping-pong us':>14}{'ratio':>8}{'x real time':>13}")
-    for number, (ours, bare, speed, _) in enumerate(rows):
-        print(f"repeat {number:<7}{ours:12.1f}{bare:14.1f}{ours / bare:8.2f}{speed:13,.0f}")
-    print(f"median        {result['tick_us_median']:12.1f}{result['ping_pong_us_median']:14.1f}", end="")
-    print(f"{result['ratio_median']:8.2f}{result['times_real_time_median']:13,.0f}")
+    for name, pairs in rows.items():
+        print(f"\n{name:14}{'sil us/tick':>12}{'ping-pong us':>14}{'ratio':>8}{'x real time':>13}")
+        for number, (ours, bare, speed, _) in enumerate(pairs):
+            print(f"repeat {number:<7}{ours:12.1f}{bare:14.1f}{ours / bare:8.2f}{speed:13,.0f}")
+        r = results[name]
+        print(f"{'medians':14}{r['tick_us']:12.1f}{r['ping_pong_us']:14.1f}{r['ratio']:8.2f}{r['times_real_time']:13,.0f}")
+
+
+def one_pair(scenario: str, folder: Path, placement: str, up: int, down: int) -> tuple[float, ...]:
+    """(us per tick, us per bare exchange, times real time, seal time in s), one right after the other."""
+    with Placed(placement):
+        run = one_run(scenario, folder)
+    timing = run.summary["timing"]
+    with Placed(placement):
+        bare_us = ping_pong_us(up, down, len(run))
+    return timing["wall_s"] / run.summary["ticks"] * 1e6, bare_us, timing["times_real_time"], timing["seal_s"]
+
+
+def summary(pairs: list[tuple[float, ...]]) -> dict[str, object]:
+    """Medians, and the spread of the ratio."""
+    ratios = [ours / bare for ours, bare, _, _ in pairs]
+    names = ("tick_us", "ping_pong_us", "times_real_time", "seal_s")
+    medians = {name: statistics.median(pair[i] for pair in pairs) for i, name in enumerate(names)}
+    return {**medians, "ratio": statistics.median(ratios), "ratio_spread": [min(ratios), max(ratios)]}
 
 
 if __name__ == "__main__":
