@@ -4,9 +4,9 @@
 
 A: a whole `sil run` in lockstep over a pty (both processes, plant, law, journal), its wall time divided by its ticks.
 B: a child that answers N bytes with M bytes by os.read and os.write alone, median of the exchanges. Both pairs of
-processes are pinned alike, once to two CPUs (`split`, what two processes get by themselves when the machine is idle), once
-to one (`same`): placement alone changes a bare exchange by a factor of three. Trust the ratio, not the absolute
-figures: they are the machine's.
+processes are pinned alike, once to two CPUs (`split`: plant and board work at the same time) and once to one (`same`):
+placement alone changes a bare exchange by a factor of three. Trust the ratio, not the absolute figures: they are the
+machine's.
 """
 
 from __future__ import annotations
