@@ -6,10 +6,12 @@ of a compiled folder start an empty cache. The package directory may be read-onl
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
+import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -35,12 +37,17 @@ def compile(function: Function) -> Function:
 
 @cache
 def cache_directory() -> Path:
-    """Directory of the compiled code: $XDG_CACHE_HOME or ~/.cache, else the user's own place in the temp directory."""
+    """Directory of the compiled code: $XDG_CACHE_HOME or ~/.cache, else the user's own place in the temp directory.
+
+    Where none of these can be used, a temporary one for this process alone.
+    """
     name = f"sil-{source_hash()}"
-    for root in (_xdg_root(), Path(tempfile.gettempdir()) / f"attitude-sil-{os.getuid()}"):
-        if _usable(root) and _usable(root / name):
+    for root in _roots():
+        if root.is_absolute() and _usable(root) and _usable(root / name):
             return root / name
-    return Path(tempfile.mkdtemp(prefix="attitude-sil-"))
+    last_resort = tempfile.mkdtemp(prefix="attitude-sil-")
+    atexit.register(shutil.rmtree, last_resort, ignore_errors=True)
+    return Path(last_resort)
 
 
 @cache
@@ -53,9 +60,11 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def _xdg_root() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(base) if os.path.isabs(base) else Path(os.path.expanduser("~")) / ".cache") / "attitude-sil"
+def _roots() -> Iterator[Path]:
+    """Where the cache may lie; a relative one is none, since it would lie in whatever is the working directory."""
+    xdg = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    yield (xdg if xdg.is_absolute() else Path(os.path.expanduser("~")) / ".cache") / "attitude-sil"
+    yield Path(tempfile.gettempdir()) / f"attitude-sil-{os.getuid()}"
 
 
 def _usable(directory: Path) -> bool:

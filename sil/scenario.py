@@ -28,6 +28,7 @@ from sil.scenario_sections import (
     Law,
     Link,
     Metrics,
+    Name,
     Plant,
     Requirement,
     Section,
@@ -44,8 +45,8 @@ MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
 class Scenario(Section):
     """One test. Times in s, angles in deg, triples [x, y, z]; see the sections for what is inside each."""
 
-    name: str = "scenario"
-    """What the run directory is called after; default: the file's name."""
+    name: Name = "scenario"
+    """What the run directory is called after; default: the file's name, - for what a name cannot have."""
     about: str = ""
     """One line for `sil scenarios`."""
     seed: Annotated[int, Field(ge=0, lt=2**64)] = 0
@@ -56,7 +57,7 @@ class Scenario(Section):
     transport_delay_ticks: Annotated[int, Field(ge=0, le=4)] = 1
     """n: COMMAND(k) acts from t_(k+n) on; 0 only in lockstep."""
     clock: Clock = "lockstep"
-    """lockstep, realtime or scaled:N"""
+    """lockstep, realtime or scaled:N, N from 0.01 to 1000"""
     board: Board = "process"
     """process, inproc, none, or where a board that already runs listens"""
     link: Link = Link()

@@ -20,6 +20,8 @@ Matrix3 = tuple[Numbers3, Numbers3, Numbers3]
 BOARDS = ("process", "inproc", "none")
 LINKS = ("pty", "udp", "inproc")
 SCALED = re.compile(r"scaled:[0-9]+(\.[0-9]+)?")
+SLOWEST, FASTEST = 0.01, 1000.0  # N of scaled:N; HELLO carries it as a Q16 number
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
 class Expected(PydanticCustomError):
@@ -109,9 +111,16 @@ def _interval(value: object) -> object:
 def _clock(value: object) -> object:
     if value in ("lockstep", "realtime"):
         return value
-    if isinstance(value, str) and SCALED.fullmatch(value) and float(value.removeprefix("scaled:")) > 0:
+    scale = float(value.removeprefix("scaled:")) if isinstance(value, str) and SCALED.fullmatch(value) else 0.0
+    if SLOWEST <= scale <= FASTEST:
         return value
-    raise Expected("lockstep, realtime or scaled:N with N above 0")
+    raise Expected(f"lockstep, realtime or scaled:N with N from {SLOWEST:g} to {FASTEST:g}")
+
+
+def _name(value: object) -> object:
+    if isinstance(value, str) and NAME.fullmatch(value):
+        return value
+    raise Expected("a name of letters A-Z a-z, digits, _ . and -, a letter or digit first")
 
 
 def _board(value: object) -> object:
@@ -155,6 +164,7 @@ InertiaMatrix = Annotated[
 UnitQuaternion = Annotated[tuple[float, float, float, float] | None, BeforeValidator(_quaternion)]
 Interval = Annotated[tuple[float, float] | None, BeforeValidator(_interval)]
 Clock = Annotated[str, BeforeValidator(_clock)]
+Name = Annotated[str, BeforeValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{NAME.pattern}$"})]
 Board = Annotated[str, BeforeValidator(_board)]
 Url = Annotated[str, BeforeValidator(_url)]
 Positive = Annotated[float, Field(gt=0)]

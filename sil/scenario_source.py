@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
@@ -38,7 +39,7 @@ class Source:
 def read_scenario(name_or_path: str, sets: Sequence[str]) -> Source:
     """A file or built-in with all it extends, then the overrides; raises ScenarioInvalid."""
     source = _read(name_or_path, FilePath(), [])
-    source.data.setdefault("name", FilePath(name_or_path).stem)
+    source.data.setdefault("name", _name_of(name_or_path))
     return _override(source, sets)
 
 
@@ -47,6 +48,11 @@ def from_values(values: dict[str, Any], where: str, directory: FilePath, sets: S
     data = _tuples(values)
     assert isinstance(data, dict)
     return _override(_normal(Source(data, {(): Where(where, 0)}, {where: directory})), sets)
+
+
+def _name_of(file: str) -> str:
+    """The file's name as a scenario's: `my test (2).yaml` is my-test-2."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "-", FilePath(file).stem).strip("-_.") or "scenario"
 
 
 def _read(name_or_path: str, directory: FilePath, chain: list[str]) -> Source:

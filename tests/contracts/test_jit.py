@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import subprocess
@@ -10,17 +11,19 @@ from pathlib import Path
 
 import pytest
 
+import firmware_sim.jit
 import sil
 from sil import jit
 
 PACKAGE = Path(sil.__file__).parent
 COMPILES = re.compile(r"^\s*(import numba|from numba|from sil import .*\bjit\b|from sil.jit)", re.MULTILINE)
-PRINT = "from sil import jit; print(jit.cache_directory())"
+PRINT = "from {} import jit; print(jit.cache_directory())"
 
 
-def directory_with(**environment: str) -> Path:
+def directory_with(package: str = "sil", cwd: Path | None = None, **environment: str) -> Path:
     everything = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment}
-    done = subprocess.run([sys.executable, "-c", PRINT], env=everything, capture_output=True, text=True, check=True)
+    command = [sys.executable, "-P", "-c", PRINT.format(package)]
+    done = subprocess.run(command, env=everything, cwd=cwd, capture_output=True, text=True, check=True)
     return Path(done.stdout.strip())
 
 
@@ -44,6 +47,37 @@ def test_an_unusable_cache_home_falls_back_to_the_temp_directory(tmp_path: Path)
     directory = directory_with(XDG_CACHE_HOME=str(tmp_path / "file"), TMPDIR=str(temp))
     assert directory.parent == temp / f"attitude-sil-{os.getuid()}"
     assert directory.is_dir()
+
+
+@pytest.mark.parametrize("package", ["sil", "firmware_sim"])
+@pytest.mark.parametrize("home", ["relative", "."])
+def test_nothing_is_cached_in_the_working_directory(tmp_path: Path, package: str, home: str) -> None:
+    """A HOME that is no absolute path."""
+    work, temp = tmp_path / "work", tmp_path / "temp"
+    work.mkdir()
+    temp.mkdir()
+    directory = directory_with(package, work, HOME=home, XDG_CACHE_HOME="also/relative", TMPDIR=str(temp))
+    assert directory.parent == temp / f"attitude-sil-{os.getuid()}"
+    assert list(work.iterdir()) == []
+
+
+@pytest.mark.parametrize("package", ["sil", "firmware_sim"])
+def test_the_directory_of_last_resort_is_gone_with_its_process(tmp_path: Path, package: str) -> None:
+    (tmp_path / "file").write_text("not a directory")
+    temp = tmp_path / "temp"
+    temp.mkdir()
+    (temp / f"attitude-sil-{os.getuid()}").write_text("in the way")
+    directory = directory_with(package, XDG_CACHE_HOME=str(tmp_path / "file"), TMPDIR=str(temp))
+    assert directory.parent == temp
+    assert not directory.exists()
+
+
+def test_both_packages_choose_alike() -> None:
+    """sil may not import firmware_sim, so there are two files; what they share is the same text."""
+    for name in ("compile", "_roots", "_usable"):
+        assert inspect.getsource(getattr(jit, name)) == inspect.getsource(getattr(firmware_sim.jit, name))
+    ours, theirs = (inspect.getsource(each.cache_directory) for each in (jit, firmware_sim.jit))
+    assert theirs == ours.replace("sil-{source", "firmware_sim-{source")
 
 
 def test_the_hash_follows_any_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

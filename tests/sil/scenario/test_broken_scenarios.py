@@ -74,7 +74,12 @@ BROKEN: dict[str, tuple[str, str, int, str, str]] = {
         "require:\n  - {metric: missed, below: 1}\n  - {metric: late, below: 1, above: 0}\n",
         "require[1]", 3, "exactly one of below, above, between", "below and above",
     ),
-    "clock of speed zero": ("clock: scaled:0\n", "clock", 1, "N above 0", "'scaled:0'"),
+    "clock of speed zero": ("clock: scaled:0\n", "clock", 1, "N from 0.01 to 1000", "'scaled:0'"),
+    "clock that rounds to zero": ("clock: scaled:0.000001\n", "clock", 1, "N from 0.01 to 1000", "'scaled:0.000001'"),
+    "clock too fast for HELLO": ("clock: scaled:100000\n", "clock", 1, "N from 0.01 to 1000", "'scaled:100000'"),
+    "name that leaves the directory": ("seed: 1\nname: ../../evil\n", "name", 2, "a name of letters", "'../../evil'"),
+    "name that is a directory": ("name: ..\n", "name", 1, "a letter or digit first", "'..'"),
+    "name of two words": ("name: my run\n", "name", 1, "a name of letters", "'my run'"),
     "unknown link": ("link: {url: tcp://x, baud: 9600}\n", "link.url", 1, "pty, udp, inproc", "'tcp://x'"),
     "impossible inertia": ("plant:\n  inertia_kgm2: [1, 1, 3]\n", "plant.inertia_kgm2", 2, "sum of the other", "3.0"),
     "inertia not symmetric": (

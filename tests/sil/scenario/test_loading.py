@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from sil.clock import clock_rate_q16, new_clock
 from sil.scenario import Scenario, json_schema, load_scenario, load_values
 from sil.scenario_errors import ScenarioInvalid
 
@@ -101,6 +102,21 @@ def test_extends_by_path_and_by_name(tmp_path: Path) -> None:
     assert (scenario.law.params["kappa"], scenario.law.params["c2_pole"]) == (0.2, 0.8)
     assert scenario.where("law.params.kappa").line == 2
     assert scenario.where("seed").file.endswith("base.yaml")
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [("my test (2).yaml", "my-test-2"), ("_x.y--z.yaml", "x.y--z"), ("δοκιμή.yaml", "scenario"), ("-r.yaml", "r")],
+)
+def test_a_file_may_be_called_anything(tmp_path: Path, file: str, name: str) -> None:
+    """The run directory is not: the default name is made of what a name can have."""
+    assert load_scenario(written(tmp_path, "seed: 1\n", file)).name == name
+
+
+@pytest.mark.parametrize("clock", ["scaled:0.01", "scaled:1000"])
+def test_the_board_is_told_every_clock_rate_that_is_allowed(clock: str) -> None:
+    scenario = load_scenario("appc-rs232", [f"clock={clock}"])
+    assert clock_rate_q16(new_clock(scenario.clock)) == pytest.approx(scenario.clock_scale * 65536, rel=1e-3)
 
 
 def test_lists_are_replaced_not_merged(tmp_path: Path) -> None:
