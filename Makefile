@@ -37,6 +37,7 @@ golden: $(VENV)/.installed
 
 bench: $(VENV)/.installed
 	$(BIN)/python -m tools.bench.lockstep
+	$(BIN)/python -m tools.bench.law_step
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info tests/e2e/node_modules

@@ -5,17 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import firmware_sim
 from firmware_sim import jit
-from firmware_sim.controllers import LAWS, inputs, new_law
-from firmware_sim.guidance.reference import Reference
-from protocol.law_tables import config_words, law_by_name, parse_configuration
 
 PACKAGE = Path(firmware_sim.__file__).parent
 STEP = """
@@ -55,23 +50,3 @@ def test_the_hash_follows_any_edit(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         after = jit.source_hash.__wrapped__()
         assert after != before
         before = after
-
-
-@pytest.mark.parametrize(("form", "limit_us"), [("fixed", 20.0), ("float", 5.0)])
-@pytest.mark.parametrize("name", LAWS)
-def test_step_time(name: str, form: str, limit_us: float) -> None:
-    """Python wrapper included; the best of many short rounds, since other work shares the machine."""
-    configuration = parse_configuration(config_words(law_by_name(name), {"form": form}))
-    dtype = np.float64 if form == "float" else np.int64
-    law, reference = new_law(name, configuration), Reference(configuration.common, form == "float")
-    inp, out = np.zeros(inputs.SIZE, dtype), np.zeros(4, dtype)
-    inp[:3] = 1, 100, 1
-    rounds = []
-    for _ in range(50):
-        reference.advance(inp)
-        start = time.perf_counter()
-        for _ in range(20):
-            law.step(inp, reference.state, out)
-        rounds.append((time.perf_counter() - start) / 20 * 1e6)
-    print(f"{name} {form}: {min(rounds):.2f} us")
-    assert min(rounds) <= limit_us
