@@ -113,8 +113,7 @@ def _with_board(
 ) -> Rig:
     made = law_orders(scenario)
     window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
-    kind, url = board_and_link(scenario)
-    kind = "wired" if wired else kind
+    kind, url = board_and_link(scenario, wired)
     host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify))
     rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made)  # type: ignore[arg-type]
     try:
@@ -171,13 +170,22 @@ def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel)
     )
 
 
-def board_and_link(scenario: Scenario) -> tuple[str, str]:
-    """(kind in BOARDS, link URL). A serial port has a board on its other end already: nobody has to be launched."""
-    if "://" in scenario.board:
-        return "wired", scenario.board
-    if scenario.board == "process" and scenario.link.url.startswith("serial:"):
-        return "wired", scenario.link.url
-    return scenario.board, scenario.link.url
+def board_and_link(scenario: Scenario, wired: bool = False) -> tuple[str, str]:
+    """(kind in BOARDS, URL of the link that is used); ("none", "") without a board.
+
+    A serial port has a board on its other end already: nobody has to be launched. Link inproc is board inproc, and the
+    other way round. wired: somebody starts the board by hand, so it needs a link that can be found.
+    """
+    board, link = scenario.board, scenario.link.url
+    if board == "none":
+        return "none", ""
+    if "://" in board:
+        return "wired", board
+    if wired and link in ("inproc", "udp"):
+        raise UsageError(f"link: expected pty, udp://HOST:PORT or serial://PATH to a board of its own, got {link!r}")
+    if wired or (board == "process" and link.startswith("serial:")):
+        return "wired", link
+    return ("inproc", "inproc") if "inproc" in (board, link) else (board, link)
 
 
 def user_law_spec(scenario: Scenario) -> str:

@@ -71,6 +71,25 @@ def test_plant_and_board_by_hand_over_a_pty(cli):
         board.communicate()
 
 
+def test_plant_takes_the_link_of_the_scenario(cli):
+    """--link has no default of its own."""
+    board = cli.start("board", "--link", "udp://127.0.0.1:0", "--once")
+    try:
+        url = board.stdout.readline().split()[1]
+        assert cli.json("plant", *SHORT, "--set", f"link.url={url}")["ticks"] == 60
+        assert board.wait(10) == 0
+    finally:
+        board.kill()
+        board.communicate()
+
+
+@pytest.mark.parametrize("option", [("--link", "inproc"), ("--board", "inproc")])
+def test_inproc_is_a_link_and_a_board(cli, option):
+    summary = cli.json("run", *SHORT, *option)
+    assert summary["verdict"] == "passed"
+    assert not (cli.folder / summary["run_dir"] / "board.log").exists()
+
+
 def test_replay_identical(cli, recorded):
     out, _ = cli("replay", str(recorded(*SHORT)))
     assert out.startswith("identical: 60 ticks")
@@ -159,6 +178,9 @@ def test_every_verb_has_help(cli, verb):
         (("recover", "nowhere"), 2, "nowhere"),
         (("diff", "nowhere", "nowhere"), 2, "nowhere"),
         (("frobnicate",), 2, "frobnicate"),
+        (("plant", "appc-udp", "--link", "inproc"), 2, "got 'inproc'"),
+        (("run", "appc-rs232", "--set", "name=../../evil"), 2, "a name of letters"),
+        (("run", "appc-rs232", "--clock", "scaled:0.001"), 2, "N from 0.01 to 1000"),
     ],
 )
 def test_bad_input_is_one_clear_line(cli, arguments, code, says):
@@ -166,6 +188,12 @@ def test_bad_input_is_one_clear_line(cli, arguments, code, says):
     assert says in err
     assert "Traceback" not in err
     assert out == ""
+
+
+@pytest.mark.parametrize("board", ["none", "wired", "serial:///dev/ttyUSB0"])
+def test_replay_goes_into_a_fresh_board(cli, recorded, board):
+    out, err = cli("replay", str(recorded(*SHORT)), "--board", board, code=2)
+    assert (out, err) == ("", f"--board: expected one of inproc, process, got '{board}'\n")
 
 
 def test_an_out_directory_that_is_not_empty_is_refused(cli):
