@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-import pytest
-from benches import BoardBench, commands, events_of, make_sample, telemetry
+import math
 
+import pytest
+from benches import BoardBench, FakeHal, commands, events_of, make_sample, telemetry
+
+from firmware_sim.board import Board
+from firmware_sim.controllers.compiled import CompiledLaw
+from firmware_sim.flight import EVENTS_PER_ANSWER, Flight
 from protocol import events, frames
 from protocol.law_tables import TELEMETRY_COMMON
 
@@ -105,6 +110,56 @@ def test_a_sample_further_ahead_restarts_bumplessly(bench):
     assert [(e.a, e.b) for e in restarted] == [(10, 15)]
     assert commands(answer)[0].torque == (0, 0, 0)  # appc begins with four quiet samples
     assert used(board.sample(16)) == [(16, frames.USED)]
+
+
+def test_a_restart_keeps_counters_and_events_that_wait(bench):
+    board = bench(period_us=300_000, answer_delay_us=345_000)
+    board.sample(0)
+    board.sample(1)  # overrun
+    for _ in range(EVENTS_PER_ANSWER):
+        board.sample(0)  # stale
+    answer = board.sample(20)
+    assert used(answer) == [(20, frames.RESTARTED)]
+    words = telemetry(answer)[0].words
+    assert (words[LOST], words[OVERRUNS], words[DROPPED]) == (1, 1, EVENTS_PER_ANSWER)
+    assert [e.code for e in events_of(answer)] == [events.RESTARTED, *[events.STALE_SAMPLE] * (EVENTS_PER_ANSWER - 1)]
+
+
+def test_a_restart_keeps_the_model_of_busy_time(bench):
+    """The lab's own recursion (B13) is not reset either."""
+    board = bench(period_us=300_000, answer_delay_us=6_000_000)
+    board.sample(0)
+    (command,) = commands(board.sample(10))
+    assert command.used == frames.RESTARTED
+    assert command.flags & frames.FLAG_OVERRUN
+
+
+def test_an_answer_has_at_most_sixteen_events(bench):
+    board = bench()
+    board.sample(0)
+    for _ in range(EVENTS_PER_ANSWER + 4):
+        board.sample(0)
+    answer = board.tick(1)  # adds SAMPLE_LOST
+    assert EVENTS_PER_ANSWER == 16
+    assert len(events_of(answer)) == EVENTS_PER_ANSWER
+    assert answer[0].follows == len(answer) - 1
+    assert telemetry(answer)[0].words[DROPPED] == EVENTS_PER_ANSWER + 4
+
+
+def test_arithmetic_saturation_is_an_event_as_its_flag_rises(bench):
+    """mrac unwraps angles and holds them to +-8 rad."""
+    board = bench("mrac")
+    flags, told = [False], []
+    for tick in range(200):
+        turn = round(0.05 * tick / (2 * math.pi) * 2**32)
+        bam = (turn + 2**31) % 2**32 - 2**31
+        plain = make_sample(tick)
+        readings = (plain.readings[0]._replace(values=(bam, 0, 0)), *plain.readings[1:])
+        answer = board.send(plain._replace(readings=readings))
+        flags.append(bool(commands(answer)[0].flags & frames.FLAG_ARITHMETIC))
+        told += [e.a for e in events_of(answer) if e.code == events.ARITHMETIC_SATURATION]
+    rises = [tick for tick in range(200) if flags[tick + 1] and not flags[tick]]
+    assert told == rises != []
 
 
 def test_identification_resumes_after_three_consecutive_good_samples(bench):
@@ -233,14 +288,43 @@ def test_config_is_idempotent():
     assert used(board.sample(0)) == [(0, frames.USED)]
 
 
-def test_warm_up_leaves_no_trace(bench):
-    """READY means compiled and warm; the first answers are those of a board that was configured twice as well."""
-    once, twice = bench(), bench()
-    twice.hello(9)
-    twice.lab.reset()
-    twice.configure()
+@pytest.mark.parametrize("form", ["fixed", "float"])
+@pytest.mark.parametrize("law", ["appc", "mrac", "pd"])
+def test_warm_up_leaves_no_trace(bench, monkeypatch, law, form):
+    """READY means compiled and warm, yet every answer is that of a flight that was never warmed up."""
+    calls = []
+    warm_up = CompiledLaw.warm_up
+    monkeypatch.setattr(CompiledLaw, "warm_up", lambda self, *arrays: calls.append(warm_up(self, *arrays)))
+    warm = bench(law, form=form)
+    assert len(calls) == 1
+    monkeypatch.setattr(Flight, "_warm_up", lambda self: None)
+    cold = bench(law, form=form)
+    assert len(calls) == 1
     for tick in range(10):
-        assert once.sample(tick) == twice.sample(tick)
+        assert warm.sample(tick) == cold.sample(tick)
+    assert warm.tick(10) == cold.tick(10)
+
+
+class Rounds(FakeHal):
+    """A hal that hands out scripted packets, and notes at each wait how often the watchdog was kicked by then."""
+
+    def __init__(self, *packets):
+        super().__init__()
+        self.packets, self.kicks_by_round = list(packets), []
+
+    def wait(self, until_ns):
+        self.kicks_by_round.append(self.kicks)
+        return self.packets.pop(0)
+
+
+def test_the_hardware_watchdog_is_kicked_once_per_round_whatever_comes():
+    hello = frames.Hello(1, frames.ROLE_LAB, 0, frames.LAYOUT_HASH, 7, 0, "test")
+    stop = frames.Stop(frames.STOP_DONE)
+    hal = Rounds(None, frames.unpack(frames.pack(hello, 0)), None, None, frames.unpack(frames.pack(stop, 1)))
+    board = Board(BoardBench().port, hal)
+    board.serve(once=True)
+    assert board.stopped
+    assert hal.kicks_by_round == [1, 2, 3, 4, 5]
 
 
 def test_stop_forgets_the_session(bench):

@@ -89,6 +89,14 @@ def test_info_text_is_readable(run: Run) -> None:
     assert max(map(len, page.splitlines())) < 120
 
 
+def test_info_text_leaves_out_what_is_empty(run: Run) -> None:
+    content = info.info(run)
+    content["identity"] |= {"law_file_sha256": "", "zero": 0}
+    keys = [line.split(" ")[0] for line in info.text(content).splitlines()]
+    assert "law_file_sha256" not in keys
+    assert "zero" in keys
+
+
 # -- diff --------------------------------------------------------------------------------------------------------------
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import itertools
 import json
 import random
@@ -16,6 +18,7 @@ from mcap_protobuf.decoder import DecoderFactory as ProtobufDecoder
 from synthetic import PERIOD_NS, synthetic_journal
 
 from protocol import events, frames
+from sil.answers import REMEMBERED_TICKS
 from sil.runs import open_run
 from sil.sinks import journal as jn
 from sil.sinks import seal as sealing
@@ -55,6 +58,46 @@ def test_arrival_order_leaves_no_trace(tmp_path: Path) -> None:
     shuffled = rewritten(source, tmp_path / "b", random.Random(7))
     assert (source / "run.journal").read_bytes() != (shuffled / "run.journal").read_bytes()
     assert seal(source).sha256 == seal(shuffled).sha256
+
+
+def delayed(source: Path, target: Path, tick: int, ticks: int) -> Path:
+    """A journal in which the answer to `tick` is written `ticks` ticks after it, as after a long stall."""
+    target.mkdir()
+    copy, late = Journal(target / "run.journal"), []
+    for record in read_journal(source / "run.journal"):
+        packet = jn.read_packet(record.payload) if record.kind == Kind.PACKET else None
+        if packet is not None and packet.direction == Direction.DOWN and record.tick == tick:
+            late.append(record)
+        elif record.kind != Kind.COMMIT:
+            copy.add(record.kind, record.tick, record.payload)
+        else:
+            if record.tick == tick + ticks:
+                for item in late:
+                    copy.add(item.kind, item.tick, item.payload)
+            copy.commit(record.tick)
+    copy.close()
+    return target
+
+
+def log_times(folder: Path) -> list[int]:
+    with open(folder / "run.mcap", "rb") as file:
+        return [m.log_time for _, _, m in make_reader(file).iter_messages(log_time_order=False)]
+
+
+def test_an_answer_as_late_as_the_laboratory_remembers_stands_at_its_tick(tmp_path: Path) -> None:
+    source = synthetic_journal(tmp_path / "a", 700)
+    late = seal(delayed(source, tmp_path / "b", 50, REMEMBERED_TICKS))
+    assert late.too_late == 0
+    assert late.sha256 == seal(source).sha256
+
+
+def test_what_comes_later_than_that_is_counted_and_the_log_does_not_go_back_in_time(tmp_path: Path) -> None:
+    source = delayed(synthetic_journal(tmp_path / "a", 700), tmp_path / "b", 50, sealing.REORDER_TICKS + 50)
+    report = seal(source)
+    assert report.too_late == 2  # COMMAND and TELEMETRY
+    assert report.complete
+    assert log_times(source) == sorted(log_times(source))
+    assert np.isnan(open_run(source).command_Nm[50]).all()
 
 
 def test_host_records_do_not_reach_run_mcap(tmp_path: Path) -> None:
@@ -211,6 +254,34 @@ def test_nothing_half_made_is_left_behind(tmp_path: Path, monkeypatch: pytest.Mo
     assert [p.name for p in source.iterdir()] == ["run.journal"]
 
 
+class FullDisk(io.RawIOBase):
+    """A file on a full disk: opening works, no write does."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        path.touch()
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize("buffer", [16, 2**24], ids=["while writing", "at the end"])
+def test_a_full_disk_says_so_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, buffer: int) -> None:
+    """Closing a file on a full disk raises, too; the partial files go all the same."""
+    source = synthetic_journal(tmp_path / "a")
+
+    def full(path: Path, mode: str) -> object:
+        return io.BufferedWriter(FullDisk(path), buffer) if mode == "wb" else open(path, mode)
+
+    monkeypatch.setattr(sealing, "open", full, raising=False)
+    with pytest.raises(SealError, match="cannot write the log: No space left on device"):
+        seal(source)
+    assert [p.name for p in source.iterdir()] == ["run.journal"]
+
+
 def test_no_journal_and_no_meta(tmp_path: Path) -> None:
     with pytest.raises(JournalError, match="cannot read the journal"):
         seal(tmp_path)
@@ -221,7 +292,7 @@ def test_no_journal_and_no_meta(tmp_path: Path) -> None:
 
 def test_memory_does_not_grow_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """At no time more than REORDER_TICKS ticks wait to be written."""
-    source = synthetic_journal(tmp_path / "a", 300)
+    source = synthetic_journal(tmp_path / "a", 700)
     most = 0
     tick = sealing._Sealing._tick
 
