@@ -1,4 +1,4 @@
-"""The columns of a run by name, with their units, in the order of `sil export`; what each one means: sil.runs."""
+"""The columns of a run by name, with their units, in the order of `sil export`; what each one means: sil.open_run."""
 
 from __future__ import annotations
 

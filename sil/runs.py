@@ -1,23 +1,6 @@
 """A finished run as numpy arrays by name: `run = open_run("runs/mrac-rs232-001"); run["phi_deg"]`.
 
-One row per tick k at t_k = k T_s. Axes x, y, z are the body's (roll, pitch, yaw); angles are those of the scenario's
-`attitude.sequence` relative to `attitude.frame`.
-
-| name | unit | what |
-|---|---|---|
-| tick, t_s | 1, s | tick number and simulation time |
-| phi_deg theta_deg psi_deg | deg | true attitude at the tick, not the reading |
-| ref_phi_deg ref_theta_deg ref_psi_deg | deg | reference, recomputed here in float64 (sil.reference) |
-| command_x_Nm command_y_Nm command_z_Nm | N m | torque computed at this tick; NaN where no COMMAND came |
-| applied_x_Nm applied_y_Nm applied_z_Nm | N m | torque acting on the body from this tick on, after limits |
-| w_x_radps w_y_radps w_z_radps | rad/s | body rate omega_BN, body axes |
-| h_x_Nms h_y_Nms h_z_Nms | N m s | absolute wheel momentum, body axes |
-| q_s q_x q_y q_z | 1 | attitude in inertial space, v_N = q v_B q*, scalar first, sign continuous |
-
-As triples (N, 3): `attitude_deg`, `reference_deg`, `error_deg` = attitude - reference modulo a turn, `setpoint_deg`,
-`setpoint_error_deg`, `command_Nm`, `applied_Nm`, `omega_radps`, `momentum_Nms`; (N, 4): `q_BN`.
-TELEMETRY by the names of the law's table, such as `g_x`, `trace_y`, `a1_z`: NaN at ticks without; `run.telemetry` has
-all of them, `run.units` every unit. Angles in TELEMETRY are in deg.
+Names and units: `help(sil.open_run)`.
 """
 
 from __future__ import annotations
@@ -75,7 +58,7 @@ class PacketRow(NamedTuple):
 
 
 class Run:
-    """A run that was read back; see the module's first lines for names and units. `run[name]`, `run.names`.
+    """A run that was read back; names and units: `help(sil.open_run)`. `run[name]`, `run.names`, `run.units`.
 
     path: the MCAP file; directory: where it lies. meta: what decides the numbers (`period_ns`, `seed`, `versions`,
     ...). scenario: the resolved scenario without clock, link, board, out. end: {"reason", "ticks"}. summary: content
@@ -310,7 +293,7 @@ class Run:
 
 
 def open_run(path: str | os.PathLike[str]) -> Run:
-    """Read a run: a run directory or an .mcap file. Every CRC is checked.
+    """Read a run: a run directory or an .mcap file; names and units: `help(sil.open_run)`. Every CRC is checked.
 
     Raises RunError, one line: no such run, not sealed yet, empty, cut off, corrupt, not MCAP, somebody else's MCAP.
     """

@@ -16,6 +16,7 @@ QUIET_S = 1.0  # nothing is drawn for a run that is over sooner
 DRAW_EVERY_S = 0.1
 PLAIN_EVERY_S = 10.0
 AXES = ("roll", "pitch", "yaw")
+ALWAYS_SHOWN = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")  # the others if not zero
 
 
 class Silent(Watch):
@@ -113,7 +114,7 @@ def show_summary(summary: Mapping[str, Any]) -> None:
         late_ms = timing["wakeup_us"]["max"] / 1000
         woke = f"{timing['degraded_ticks']} of {summary['ticks']} ticks woke more than a period late"
         console.print(f"[yellow]degraded[/]: {woke}, at most {late_ms:.1f} ms: a busy machine or too fast a clock")
-    link = summary["link"]
+    link = {name: count for name, count in summary["link"].items() if count or name in ALWAYS_SHOWN}
     if errors:
         console.print("link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items()))
     if not summary["reproducible"]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sil
+from sil.run_columns import COLUMNS, TRIPLES
 from sil.scenario_errors import ScenarioInvalid
 
 
@@ -22,6 +23,12 @@ def test_run_gives_arrays_by_name_with_units(run):
     assert run.units["command_x_Nm"] == "N m"
     assert run["t_s"][-1] == 59.5
     assert np.isfinite(run["g_x"]).all()
+
+
+def test_the_docstring_says_every_name_and_its_unit():
+    rows = [line.strip().strip("|").split("|") for line in sil.open_run.__doc__.splitlines() if line.count("|") == 4]
+    said = {name: row[1].strip() for row in rows[2:] for name in row[0].split()}
+    assert said == COLUMNS | TRIPLES
 
 
 def test_overrides_are_what_ran(run):
