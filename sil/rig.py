@@ -53,6 +53,7 @@ class Rig:
     orders: Orders | None = None
     answers: Answers | None = None
     config_packets: tuple[bytes, ...] = ()
+    plugged: tuple[str, str] = ("none", "")  # kind of board and URL of its link, as board_and_link() found them
 
     def stop(self, reason: int) -> None:
         """Tell the board that the session is over, and unplug. Leaves no process behind; safe to call twice."""
@@ -115,7 +116,7 @@ def _with_board(
     window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
     kind, url = board_and_link(scenario, wired)
     host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify))
-    rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made)  # type: ignore[arg-type]
+    rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made, plugged=(kind, url))  # type: ignore[arg-type]
     try:
         # The plant compiles or loads while the board process starts and does the same.
         rig.port = Port(host.link, tap=_housekeeping_to(recorder))

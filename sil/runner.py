@@ -76,6 +76,8 @@ def run_scenario(
         if outcome.ticks > MANY_TICKS:
             watch.note(f"sealing the log of {outcome.ticks} ticks")
         report = seal(folder)
+        if report.too_late:
+            watch.note(f"{report.too_late} records came too late to stand in their place in run.mcap: left out")
         summary = _summary(scenario, folder, outcome, report)
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
         (folder / "summary.json").write_text(text, encoding="utf-8")
@@ -206,11 +208,12 @@ def _law_file_sha256(scenario: Scenario) -> str:
 def host_facts(scenario: Scenario, rig: Rig) -> dict[str, Any]:
     """HOST: what describes this machine, link and board; timing.mcap only."""
     board = rig.session.board if rig.session is not None else None
+    kind, url = rig.plugged
     return {
         "clock": scenario.clock,
-        "link": scenario.link.url,
+        "link": url,
         "baud": scenario.link.baud,
-        "board": scenario.board,
+        "board": kind,
         "board_build": board.build if board is not None else "",
         "python": platform.python_version(),
         "platform": platform.platform(),
