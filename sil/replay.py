@@ -32,6 +32,7 @@ from sil.trouble import LinkFailure, UsageError
 DELIVERED = "delivered"
 ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
 LOOK_EVERY_S = 0.25
+TYPE_AT = 1  # of a packet
 
 
 class Difference(NamedTuple):
@@ -106,7 +107,7 @@ class RecordedTick(NamedTuple):
     tick: int
     sample: bytes | None
     used: bool  # the board stepped on the SAMPLE
-    stale: bool  # the SAMPLE came, but after the board's own timer
+    stale: tuple[int, ...]  # ticks of SAMPLEs that came since the last step, too late for their own
     answer: tuple[bytes, ...]
     open_end: bool  # the run ended before the answer: none is expected
 
@@ -137,10 +138,10 @@ def _recorded(tick: int, rows: list[PacketRow], open_end: bool) -> RecordedTick:
     sample = next((row for row in rows if row.type == Type.SAMPLE), None)
     answer = tuple(row.packet for row in rows if row.direction == "down" and row.type in ANSWERS)
     ordered = tuple(sorted(answer, key=lambda packet: int.from_bytes(packet[2:4], "little")))
-    came, stepped = sample is not None and sample.fate == DELIVERED, _stepped_without(ordered)
-    return RecordedTick(
-        tick, sample.packet if sample else None, came and not stepped, came and stepped, ordered, open_end
-    )
+    used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
+    reported = [_frame(packet) for packet in ordered if packet[TYPE_AT] == Type.EVENT]
+    stale = tuple(event.a for event in reported if event is not None and event.code == events.STALE_SAMPLE)
+    return RecordedTick(tick, sample.packet if sample else None, used, stale, ordered, open_end)
 
 
 def _stepped_without(answer: tuple[bytes, ...]) -> bool:
@@ -183,9 +184,12 @@ def _replay_session(
         talk = Session(port, 0, host.check_alive)
         talk.open(made.words, made.configuration.hash, HELLO_WITHIN_S, lambda line: None)
         report.config = config_differences(session.config, made)
+        samples = {recorded.tick: recorded.sample for recorded in session.ticks}
         for recorded in session.ticks:
             if recorded.open_end:
                 break
+            for tick in recorded.stale:
+                port.write(*filter(None, [samples.get(tick)]))  # the board counts and drops it
             report.first = _replay_tick(port, recorded, host.check_alive)
             if report.first is not None:
                 return
@@ -205,8 +209,6 @@ def _replay_tick(port: Port, recorded: RecordedTick, check_alive: Callable[[], N
     else:
         port.send(Tick(recorded.tick))
     answer = _answer(port, recorded.tick, check_alive)
-    if recorded.stale:
-        port.write(recorded.sample)  # it came after its tick was stepped: the board counts and drops it
     for expected, got in _side_by_side(recorded.answer, answer):
         if expected != got:
             return Difference(recorded.tick, expected, got)
