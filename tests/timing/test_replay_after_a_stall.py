@@ -1,4 +1,4 @@
-"""A lab that stood still leaves a log whose stale samples have their place: replay gives them there, and is identical."""
+"""A lab that stood still leaves a log whose stale samples have their place; replay puts them there: identical."""
 
 from __future__ import annotations
 
