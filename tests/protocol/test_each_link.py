@@ -37,12 +37,22 @@ def test_pty_waits_for_a_board_that_is_not_there_yet() -> None:
         assert time.monotonic() - start >= 0.049
 
 
+def take(link: link_module.Link, count: int) -> bytes:
+    """`count` bytes, in as many pieces as a byte stream likes to give them."""
+    data = b""
+    while len(data) < count:
+        piece = link.receive(5.0)
+        assert piece, f"{len(data)} of {count} bytes came"
+        data += piece
+    return data
+
+
 def test_pty_keeps_what_was_written_before_the_board_opened() -> None:
     data = bytes(range(256)) * 10
     with open_link("pty", listen=False) as lab:
         lab.send(data)
         with open_link(lab.url, listen=True) as board:
-            assert board.receive(1.0) == data
+            assert take(board, len(data)) == data
 
 
 def test_pty_delivers_the_last_words_before_the_hang_up() -> None:
@@ -141,9 +151,9 @@ def test_a_real_port_is_opened_exclusively_and_drained(monkeypatch: pytest.Monke
             assert (board.url, board.baud) == (url, 57600)
             assert board.receive(0.05) == b""
             lab.send(bytes(range(256)))
-            assert board.receive(1.0) == bytes(range(256))
+            assert take(board, 256) == bytes(range(256))
             board.send(bytes(range(256)))
-            assert lab.receive(1.0) == bytes(range(256))
+            assert take(lab, 256) == bytes(range(256))
             with pytest.raises(LinkError, match=rf"^serial {path}: cannot open: another program has it open$"):
                 open_link(url, listen=True)
             board.close()
