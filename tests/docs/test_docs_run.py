@@ -41,6 +41,11 @@ class Block(NamedTuple):
         return [(EXIT.sub("", line), int(found[1]) if (found := EXIT.search(line)) else 0) for line in lines]
 
 
+def held_up(printed: str) -> bool:
+    """A paced run passed, or says that this machine was too busy for its clock."""
+    return printed.startswith(("passed", "degraded")) or "not reproducible" in printed
+
+
 def blocks(document: str) -> list[Block]:
     return [Block(*(part or "" for part in found)) for found in FENCE.findall((REPO / document).read_text())]
 
@@ -94,7 +99,7 @@ def test_the_guides_commands_run_and_exit_as_it_says(guide: Path) -> None:
             for command, code in block.commands():
                 paced = "--clock scaled" in command  # a busy machine may degrade it, which is not the guide's fault
                 printed = shell(command, guide, None if paced else code)
-                assert not paced or printed.startswith(("passed", "degraded")), printed
+                assert not paced or held_up(printed), printed
                 count += 1
         elif block.language == "python" and block.name == "reads.py":
             shell(f"python {block.name}", guide)
@@ -191,7 +196,7 @@ def test_the_readmes_clock_is_accepted(tmp_path: Path) -> None:
     """That all clocks give the same bytes is tests/e2e/test_same_bytes.py's."""
     run = readme_commands()[0].split(" && ")[1] + " --set duration_s=20"
     assert "--clock scaled:20" in run
-    assert shell(run, tmp_path, None).startswith(("passed", "degraded"))
+    assert held_up(shell(run, tmp_path, None))
 
 
 def test_make_check_is_a_target() -> None:
