@@ -25,10 +25,6 @@ class Orders(NamedTuple):
     words: tuple[int, ...]
     configuration: Configuration
 
-    def setpoint(self, tick: int) -> tuple[int, int, int]:
-        """r(k) in 2^-32 turn: the last row at or before `tick`; zero before the first."""
-        return row_at(self.configuration.rows, tick)
-
 
 def row_at(rows: tuple[Row, ...], tick: int) -> tuple[int, int, int]:
     """The x, y, z of the last row at or before `tick`; zero before the first."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import ClassVar, NamedTuple, TypeAlias
 
@@ -41,7 +42,7 @@ def size(fields: Sequence[Field]) -> int:
     return sum(field.length for field in fields)
 
 
-class CompiledLaw:
+class CompiledLaw(ABC):
     """Base of pd, mrac and appc: `state` and `par` are int64 (fixed) or float64 arrays, `step` runs one function.
 
     A law gives STATE, RANGES, `functions` and `compiled` (float step, fixed step, as source and compiled), the
@@ -68,16 +69,16 @@ class CompiledLaw:
         self.initialise(self.state)
 
     @staticmethod
+    @abstractmethod
     def float_par(configuration: Configuration) -> Sequence[float]:
         """Parameters of the float form."""
-        raise NotImplementedError
 
     @staticmethod
+    @abstractmethod
     def fixed_par(configuration: Configuration) -> Sequence[int]:
         """Parameters of the fixed form, derived from the words by named operations only."""
-        raise NotImplementedError
 
-    def initialise(self, state: np.ndarray) -> None:
+    def initialise(self, state: np.ndarray) -> None:  # noqa: B027  (only laws with a state that is not zero do something)
         """Set what does not start at zero."""
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import socket
 import time
+from abc import abstractmethod
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -55,9 +56,9 @@ class UdpLink(Link):
             if timeout_s:
                 timeout_s = max(0.0, deadline - time.monotonic())
 
+    @abstractmethod
     def _read(self) -> bytes:
         """One datagram, or b"" when what woke us does not count."""
-        raise NotImplementedError
 
     def _failure(self, error: Exception) -> LinkError:
         if self._socket.fileno() < 0:
