@@ -103,8 +103,8 @@ def _sensors(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _clock(scenario: Scenario) -> Iterator[Finding]:
-    if scenario.transport_delay_ticks == 0 and scenario.clock != "lockstep":
-        got = f"{scenario.clock} with transport_delay_ticks 0"
+    if scenario.transport_delay_ticks == 0 and scenario.clock.mode != "lockstep":
+        got = f"{scenario.clock.mode} with transport_delay_ticks 0"
         yield _error(scenario, "clock", "lockstep, where the plant waits for the answer", got)
     if scenario.sample_timeout_us >= scenario.period_us:
         expected = f"a number in s below the period ({scenario.period_s:g})"

@@ -210,7 +210,7 @@ def host_facts(scenario: Scenario, rig: Rig) -> dict[str, Any]:
     board = rig.session.board if rig.session is not None else None
     kind, url = rig.plugged
     return {
-        "clock": scenario.clock,
+        "clock": scenario.clock.mode,
         "link": url,
         "baud": scenario.link.baud,
         "board": kind,

@@ -33,12 +33,13 @@ from sil.scenario_sections import (
     Requirement,
     Section,
     Sensors,
+    Timing,
     Wire,
 )
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
 
-NOT_IDENTITY = ("clock", "link", "board", "out")  # how it is run, not what is run
+NOT_IDENTITY = ("clock", "timing", "link", "board", "out")  # how it is run, not what is run
 MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
 
 
@@ -56,8 +57,8 @@ class Scenario(Section):
     """T_s, a whole number of microseconds."""
     transport_delay_ticks: Annotated[int, Field(ge=0, le=4)] = 1
     """n: COMMAND(k) acts from t_(k+n) on; 0 only in lockstep."""
-    clock: Clock = "lockstep"
-    """lockstep, realtime or scaled:N, N from 0.01 to 1000"""
+    clock: Clock = Clock()
+    timing: Timing = Timing()
     board: Board = "process"
     """process, inproc, none, or where a board that already runs listens"""
     link: Link = Link()
@@ -116,7 +117,7 @@ class Scenario(Section):
     @property
     def clock_scale(self) -> float:
         """Simulated seconds per wall second: 1 for realtime, N for scaled:N, 0 for lockstep."""
-        return {"lockstep": 0.0, "realtime": 1.0}.get(self.clock) or float(self.clock.partition(":")[2] or 0)
+        return {"lockstep": 0.0, "realtime": 1.0}.get(self.clock.mode) or float(self.clock.mode.partition(":")[2] or 0)
 
     @property
     def torque_bits(self) -> int:
@@ -158,7 +159,7 @@ class Scenario(Section):
         return self.model_dump(mode="json")
 
     def identity(self) -> dict[str, Any]:
-        """resolved() without clock, link, board and out: what the numbers of a run depend on."""
+        """resolved() without clock, timing, link, board and out: what the numbers of a run depend on."""
         return {key: value for key, value in self.resolved().items() if key not in NOT_IDENTITY}
 
 

@@ -163,7 +163,7 @@ InertiaMatrix = Annotated[
 ]
 UnitQuaternion = Annotated[tuple[float, float, float, float] | None, BeforeValidator(_quaternion)]
 Interval = Annotated[tuple[float, float] | None, BeforeValidator(_interval)]
-Clock = Annotated[str, BeforeValidator(_clock)]
+ClockMode = Annotated[str, BeforeValidator(_clock)]
 Name = Annotated[str, BeforeValidator(_name), WithJsonSchema({"type": "string", "pattern": f"^{NAME.pattern}$"})]
 Board = Annotated[str, BeforeValidator(_board)]
 Url = Annotated[str, BeforeValidator(_url)]
@@ -333,6 +333,35 @@ class Wire(Section):
     """null: 30, lowered until the torque limit fits; 20 without a limit."""
     momentum_bits: Annotated[int, Field(ge=8, le=30)] = 28
     rate_bits: Annotated[int, Field(ge=8, le=30)] = 28
+
+
+class Clock(Section):
+    """When ticks happen, and what the machine is asked to grant for it; `clock: realtime` is short for its mode."""
+
+    mode: ClockMode = "lockstep"
+    """lockstep, realtime or scaled:N, N from 0.01 to 1000"""
+    priority: Annotated[int, Field(ge=1, le=99)] | None = None
+    """SCHED_FIFO priority of laboratory and board process; null: ordinary scheduling."""
+    lock_memory: bool | None = None
+    """mlockall in both processes; null: when a priority is asked for."""
+    lab_cpu: Count | None = None
+    """CPU the laboratory runs on; null: the kernel decides."""
+    board_cpu: Count | None = None
+    """CPU the board process runs on; null: the kernel decides."""
+
+    @property
+    def locks_memory(self) -> bool:
+        """lock_memory with its default."""
+        return self.priority is not None if self.lock_memory is None else self.lock_memory
+
+
+class Timing(Section):
+    """When a paced run counts as `degraded`; nothing of it touches the simulation."""
+
+    max_lateness_ms: Positive | None = None
+    """A tick that wakes later is late; null: one period on the wall clock (T_s / N)."""
+    max_degraded_fraction: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Share of late ticks beyond which the run is degraded."""
 
 
 class Link(Section):

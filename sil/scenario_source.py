@@ -14,7 +14,7 @@ from sil.scenarios import built_in_file, list_scenarios
 
 MOST_BYTES = 1_000_000
 # Keys that may be written short: `link: udp` is `link: {url: udp}`.
-SHORT: dict[Path, str] = {("link",): "url", ("plant", "disturbance_Nm"): "constant_Nm"}
+SHORT: dict[Path, str] = {("clock",): "mode", ("link",): "url", ("plant", "disturbance_Nm"): "constant_Nm"}
 
 
 @dataclass

@@ -30,7 +30,7 @@ OutOption = Annotated[
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, for programs.")]
 
-_KEYS = {"clock": "clock", "link": "link.url", "board": "board"}
+_KEYS = {"clock": "clock.mode", "link": "link.url", "board": "board"}
 
 
 def scenario_from(name: str, sets: list[str] | None, **options: str | None) -> Scenario:

@@ -116,7 +116,7 @@ def test_a_file_may_be_called_anything(tmp_path: Path, file: str, name: str) -> 
 @pytest.mark.parametrize("clock", ["scaled:0.01", "scaled:1000"])
 def test_the_board_is_told_every_clock_rate_that_is_allowed(clock: str) -> None:
     scenario = load_scenario("appc-rs232", [f"clock={clock}"])
-    assert clock_rate_q16(new_clock(scenario.clock)) == pytest.approx(scenario.clock_scale * 65536, rel=1e-3)
+    assert clock_rate_q16(new_clock(scenario.clock.mode)) == pytest.approx(scenario.clock_scale * 65536, rel=1e-3)
 
 
 def test_lists_are_replaced_not_merged(tmp_path: Path) -> None:
