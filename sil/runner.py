@@ -45,8 +45,14 @@ class Watch:
     def note(self, line: str) -> None:
         """Something worth a line: a board that compiles, a pty that waits for its board."""
 
+    def plugged(self, scenario: Scenario, rig: Rig) -> None:
+        """Everything is assembled and the board READY; what stands in the rig may be read from now on, never written."""
+
     def tick(self, tick: int, ticks: int, motion: Motion) -> None:
         """A tick is over."""
+
+    def event(self, tick: int, code: int, a: int, b: int, origin: int = 0) -> None:
+        """Something happened, in the numbers of protocol.events; origin 0: the laboratory says so, 1: the board."""
 
     def stage(self, name: str) -> None:
         """`start`, `run`, `seal`."""
@@ -69,7 +75,7 @@ def run_scenario(
         journal = Journal(folder / "run.journal")
     except JournalError as error:
         raise UsageError(str(error)) from None
-    recorder = JournalRecorder(journal)
+    recorder = JournalRecorder(journal, watch.event)
     with StopRequests() as stop:
         outcome = _fly(scenario, folder, made, recorder, stop, watch, wired)
         watch.stage("seal")
@@ -125,6 +131,7 @@ def _fly(
         _discard(folder, made, recorder)
         raise
     stop.hold()
+    watch.plugged(scenario, rig)
     recorder.start(identity(scenario, rig), host_facts(scenario, rig))
     recorder.session(0)
     record_config(rig, recorder, 0)

@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
+from protocol import frames
 from sil.signals import Motion, Vector
 from sil.sinks import journal
 from sil.sinks.journal import Journal, Kind
 
 
-class JournalRecorder:
-    """Writes to an open Journal; JournalError (disk full) reaches the loop, which ends the run with what is kept."""
+OnEvent = Callable[[int, int, int, int, int], None]  # tick, code, a, b, origin
+TYPE_AT = 1  # of a packet
 
-    def __init__(self, target: Journal) -> None:
+
+class JournalRecorder:
+    """Writes to an open Journal; JournalError (disk full) reaches the loop, which ends the run with what is kept.
+
+    on_event(tick, code, a, b, origin) hears of every event, the laboratory's (origin 0) and the board's (1).
+    """
+
+    def __init__(self, target: Journal, on_event: OnEvent | None = None) -> None:
         self._journal = target
+        self._on_event = on_event
         self._tick = 0  # the tick under way
 
     def start(self, meta: Mapping[str, Any], host: Mapping[str, Any]) -> None:
@@ -29,6 +38,9 @@ class JournalRecorder:
 
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         self._journal.add(Kind.PACKET, tick, journal.packet_payload(direction, fate, packet))
+        if packet[TYPE_AT] == frames.Type.EVENT and self._on_event is not None:
+            event: frames.Event = frames.unpack(packet).frame
+            self._on_event(tick, event.code, event.a, event.b, 1)
 
     def housekeeping(self, direction: int, packet: bytes) -> None:
         payload = journal.housekeeping_payload(direction, time.monotonic_ns(), packet)
@@ -36,6 +48,8 @@ class JournalRecorder:
 
     def event(self, tick: int, code: int, a: int, b: int) -> None:
         self._journal.add(Kind.LAB_EVENT, tick, journal.event_payload(code, a, b))
+        if self._on_event is not None:
+            self._on_event(tick, code, a, b, 0)
 
     def truth(
         self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int
