@@ -1,0 +1,29 @@
+"""A recorder that keeps nothing: for runs of which only the end, or the time they take, is wanted."""
+
+from __future__ import annotations
+
+from sil.signals import Motion, Vector
+
+
+class Nothing:
+    """A `sil.signals.Recorder` whose rows are gone as soon as they are handed over."""
+
+    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+        """Not kept."""
+
+    def housekeeping(self, direction: int, packet: bytes) -> None:
+        """Not kept."""
+
+    def event(self, tick: int, code: int, a: int, b: int) -> None:
+        """Not kept."""
+
+    def truth(
+        self, motion: Motion, applied_Nm: Vector, setpoint_bam: tuple[int, int, int], source: int, tick: int
+    ) -> None:
+        """Not kept."""
+
+    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
+        """Not kept."""
+
+    def commit(self, tick: int) -> None:
+        """Nothing to write."""
