@@ -25,13 +25,21 @@ UserLawClass: TypeAlias = tuple[LawTable, type]
 class Board:
     """Serves one laboratory at a time over `port`; knows no wall clock but `hal.now` and no plant at all.
 
-    user_law: table and class of a law that is not built in (`firmware_sim.controllers.user`), or None.
+    user_law: table and class of a law that is not built in (`firmware_sim.controllers.user`), or None. configured() is
+    called when a law is built and warm, before READY leaves.
     """
 
-    def __init__(self, port: Port, hal: Hal, user_law: UserLawClass | None = None) -> None:
+    def __init__(
+        self,
+        port: Port,
+        hal: Hal,
+        user_law: UserLawClass | None = None,
+        configured: Callable[[], None] = lambda: None,
+    ) -> None:
         self._port = port
         self._hal = hal
         self._user_law = user_law
+        self._configured = configured
         self._nonce: int | None = None
         self._clock_rate_q16 = 0
         self._handlers: dict[int, Callable[[Packet], None]] = {
@@ -117,6 +125,7 @@ class Board:
             return Ready(error.status, error.index, 0)
         except FlightRefused:
             return Ready(frames.READY_LAW_REFUSES, frames.NO_INDEX, 0)
+        self._configured()
         return Ready(frames.READY_OK, frames.NO_INDEX, self._flight.table_hash)
 
     def _on_stop(self, packet: Packet) -> None:

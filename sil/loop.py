@@ -9,6 +9,7 @@ Nothing here reads a wall clock: the `Clock` says when a tick happens, tick numb
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from protocol import events
 from protocol.frames import Reading, Sample
 from sil.clock import Clock
 from sil.commands import Acting, Decides
+from sil.lateness import QUIET, Account, Wake
 from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
 
 LARGEST = 2**31 - 1
@@ -65,10 +67,11 @@ class Loop:
         self.board, self.commands, self.recorder, self.clock = board, commands, recorder, clock
         self.period_s = timing.period_ns * 1e-9
         self.bound_rad = None if bound_deg is None else math.radians(bound_deg)
-        self.degraded_ticks = 0
         self.ticks_done = timing.first_tick
-        self.lateness_ns: list[int] = []
-        self._late_ns: dict[int, int] = {}  # of the ticks that are not yet whole
+        self.account = Account()
+        self.lateness_ns, self.causes = array("q"), array("B")  # of every wake-up of a paced run
+        self.rebased_ticks = self.slipped_ns = 0  # how often the epoch was moved, and how far in all
+        self._wakes: dict[int, Wake] = {}  # of the ticks that are not yet whole
 
     def tick(self, k: int) -> Motion:
         """One tick. With delay 0 (lockstep only) the plant waits for COMMAND(k) before it integrates."""
@@ -81,7 +84,7 @@ class Loop:
             raise PlantBroke(k)
         applied = self._limited(acting, motion)
         self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
-        self.recorder.commit(max(k - 1, 0))  # tick k - 1 is whole only now, with its answer; the board works meanwhile
+        self._commit(k - 1)  # tick k - 1 is whole only now, with its answer; the board works meanwhile
         if not delay:
             self.board.drain(k)
             applied = self._limited(self.commands.decide(k), motion)
@@ -91,6 +94,12 @@ class Loop:
 
     def run(self, stop: Callable[[], bool], progress: Callable[[int, Motion], None]) -> tuple[int, str]:
         """All ticks; returns (ticks done, reason): `finished`, or `interrupted` when `stop()` said so."""
+        if not self.clock.paced:
+            return self._run(stop, progress)
+        with self.account:
+            return self._run(stop, progress)
+
+    def _run(self, stop: Callable[[], bool], progress: Callable[[int, Motion], None]) -> tuple[int, str]:
         first = self.timing.first_tick
         self.clock.start(first * self.timing.period_ns)
         for k in range(first, self.timing.ticks):
@@ -117,7 +126,7 @@ class Loop:
     def _ended(self, ticks: int, reason: str) -> tuple[int, str]:
         self._timing(ticks - 1)
         self._notices(ticks - 1)
-        self.recorder.commit(max(ticks - 1, 0))
+        self._commit(ticks - 1)
         return ticks, reason
 
     def _beyond(self, k: int, motion: Motion) -> bool:
@@ -136,11 +145,14 @@ class Loop:
         if not self.clock.paced:
             return
         t_ns = k * self.timing.period_ns
-        late_ns = self.clock.wait(t_ns, self.board.listen)
+        self.account.sleeps()
+        late_ns = self.clock.wait(t_ns, self.account.listening(self.board.listen))
+        wake = self._wakes[k] = self.account.woke(late_ns)
         self.lateness_ns.append(late_ns)
-        self._late_ns[k] = late_ns
+        self.causes.append(wake.cause)
         if late_ns > self.timing.period_ns / self.clock.scale:
-            self.degraded_ticks += 1
+            self.rebased_ticks += 1
+            self.slipped_ns += late_ns
             self.recorder.event(k, events.EPOCH_REBASED, k, min(late_ns // 1000, 2**31 - 1))
             self.clock.rebase(t_ns)
 
@@ -169,7 +181,14 @@ class Loop:
     def _timing(self, k: int) -> None:
         """Host times of tick k, known once its answer is here."""
         if k >= self.timing.first_tick:
-            self.recorder.timing(k, self._late_ns.pop(k, 0), self.board.last_answer_ns)
+            self.recorder.timing(k, self._wakes.pop(k, QUIET), self.board.last_answer_ns)
+
+    def _commit(self, k: int) -> None:
+        """Tick k is whole: one write."""
+        if self.clock.paced:
+            self.account.writing(self.recorder.commit, max(k, 0))
+        else:
+            self.recorder.commit(max(k, 0))
 
     def _notices(self, k: int) -> None:
         for code, a, b in self.commands.notices:

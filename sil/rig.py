@@ -22,6 +22,7 @@ from sil.configure import Orders, orders, row_at
 from sil.loop import Loop, Scales, Timing
 from sil.plants import PLANTS
 from sil.plugins import load
+from sil.realtime import may_lock_memory
 from sil.scenario import Scenario
 from sil.scenario_law import is_user_law
 from sil.schedule import read_schedule
@@ -115,7 +116,8 @@ def _with_board(
     made = law_orders(scenario)
     window = CommandWindow(scenario.transport_delay_ticks, scenario.period_ns, scenario.hold_limit)
     kind, url = board_and_link(scenario, wired)
-    host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify))
+    locks = scenario.clock.locks_memory and may_lock_memory()
+    host = plug_in(kind, BoardOrder(url, user_law_spec(scenario), log, notify, locks))
     rig = Rig(loop=None, clock=clock, window=window, host=host, orders=made, plugged=(kind, url))  # type: ignore[arg-type]
     try:
         # The plant compiles or loads while the board process starts and does the same.

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import platform
-import signal
 import time
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -16,8 +16,10 @@ import numpy as np
 
 from protocol import events, frames
 from protocol.links import LinkError
+from sil import lateness
 from sil.checks import check
 from sil.metrics import Judgement, judge, measure
+from sil.realtime import Granted, granted, refuse_impossible, suspended_ns
 from sil.rig import Rig, assemble, record_config, user_law_spec
 from sil.runs import open_run
 from sil.scenario import Scenario
@@ -25,6 +27,7 @@ from sil.signals import Motion
 from sil.sinks.journal import Journal, JournalError
 from sil.sinks.recorder import JournalRecorder
 from sil.sinks.seal import SealReport, seal
+from sil.stopping import StopRequests
 from sil.trouble import (
     EXIT_INTERRUPTED,
     EXIT_LINK,
@@ -46,7 +49,7 @@ class Watch:
         """Something worth a line: a board that compiles, a pty that waits for its board."""
 
     def plugged(self, scenario: Scenario, rig: Rig) -> None:
-        """Everything is assembled and the board READY; what stands in the rig may be read from now on, never written."""
+        """Everything is assembled and the board READY; the rig may be read from now on, never written."""
 
     def tick(self, tick: int, ticks: int, motion: Motion) -> None:
         """A tick is over."""
@@ -70,6 +73,7 @@ def run_scenario(
     """
     watch = watch or Watch()
     refuse_hopeless(scenario)
+    refuse_impossible(scenario.clock)
     folder, made = new_run_dir(scenario.name, out)
     try:
         journal = Journal(folder / "run.journal")
@@ -109,6 +113,8 @@ class Outcome:
         self.error: Exception | None = None
         self.wall_s = 0.0
         self.start_s = 0.0
+        self.suspended_s = 0.0
+        self.granted: Granted | None = None
         self.rig: Rig | None = None
 
 
@@ -137,13 +143,18 @@ def _fly(
     record_config(rig, recorder, 0)
     outcome.start_s = time.perf_counter() - started
     watch.stage("run")
-    began = time.perf_counter()
+    began, asleep_ns = time.perf_counter(), suspended_ns()
 
     def show(tick: int, motion: Motion) -> None:
         watch.tick(tick, scenario.ticks, motion)
 
     try:
-        _, outcome.reason = rig.loop.run(stop.asked, show)
+        with granted(scenario.clock, rig.clock.paced, rig.host.pid if rig.host is not None else None) as got:
+            outcome.granted = got
+            for line in got.refused:
+                watch.note(line)
+            began, asleep_ns = time.perf_counter(), suspended_ns()
+            _, outcome.reason = rig.loop.run(stop.asked, show)
     except (LinkError, LinkFailure, JournalError) as error:
         outcome.failure = _why(rig, error)
     except Exception as error:
@@ -151,6 +162,7 @@ def _fly(
     finally:
         outcome.ticks = rig.loop.ticks_done
         outcome.wall_s = time.perf_counter() - began
+        outcome.suspended_s = (suspended_ns() - asleep_ns) // 1_000_000 / 1e3
         rig.stop({"finished": frames.STOP_DONE, "interrupted": frames.STOP_INTERRUPTED}.get(outcome.reason, 2))
         _close(recorder, outcome)
     return outcome
@@ -269,9 +281,9 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
     link = _link_counters(outcome.rig, metrics)
     metrics |= {"crc_errors": link["crc_errors"], "discarded_bytes": link["discarded_bytes"]}
     judgements = judge(scenario.require, metrics) if outcome.reason in ("finished", "diverged") else []
-    degraded = outcome.rig.loop.degraded_ticks if outcome.rig else 0
+    timing = _timing(scenario, outcome, report)
     not_a_number = sum(event.code in (events.NAN, events.PLANT_NAN) for event in run.events)
-    exit_code, verdict = _verdict(outcome, judgements, degraded, not_a_number)
+    exit_code, verdict = _verdict(outcome, judgements, timing["degraded"], not_a_number)
     window = outcome.rig.window if outcome.rig else None
     return {
         "verdict": verdict,
@@ -286,7 +298,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "require": [_plain(judgement._asdict()) for judgement in judgements],
         "not_a_number": not_a_number,
         "link": link,
-        "timing": _timing(scenario, outcome, report),
+        "timing": timing,
         "reproducible": not (window.real_misses if window else 0),
         "sha256": report.sha256,
         "law_file": _law_file(scenario),
@@ -294,7 +306,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
     }
 
 
-def _verdict(outcome: Outcome, judgements: list[Judgement], degraded: int, not_a_number: int) -> tuple[int, str]:
+def _verdict(outcome: Outcome, judgements: list[Judgement], degraded: bool, not_a_number: int) -> tuple[int, str]:
     """The first line of the table of exit codes that applies; NaN anywhere is a failure, asked for or not."""
     if outcome.reason == "interrupted":
         return EXIT_INTERRUPTED, "interrupted"
@@ -322,26 +334,28 @@ def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int
 
 
 def _timing(scenario: Scenario, outcome: Outcome, report: SealReport) -> dict[str, Any]:
+    """The wall-clock side of a run; `degraded` by the scenario's limits, or because the machine was suspended."""
     simulated_s = outcome.ticks * scenario.period_ns * 1e-9
-    rig = outcome.rig
+    rig, got = outcome.rig, outcome.granted
+    loop = rig.loop if rig is not None else None
+    wall_period_ns = scenario.period_ns / scenario.clock_scale if scenario.clock_scale else math.inf
+    lateness_ns, caused = (loop.lateness_ns, loop.causes) if loop is not None else ((), ())
+    wakes = lateness.of_run(lateness_ns, caused, wall_period_ns, scenario.timing.max_lateness_ms)
+    too_many = wakes["late_fraction"] > scenario.timing.max_degraded_fraction
     return {
         "wall_s": outcome.wall_s,
         "start_s": outcome.start_s,
         "seal_s": report.wall_s,
         "times_real_time": simulated_s / outcome.wall_s if outcome.wall_s > 0 else 0.0,
-        "wakeup_us": percentiles_us(rig.loop.lateness_ns if rig else []),
-        "answer_us": percentiles_us(rig.answers.answer_ns if rig and rig.answers else []),
-        "degraded_ticks": rig.loop.degraded_ticks if rig else 0,
+        **wakes,
+        "answer_us": lateness.percentiles_us(rig.answers.answer_ns if rig and rig.answers else []),
+        "degraded_ticks": wakes["late_ticks"],
+        "degraded": too_many or outcome.suspended_s > 0,
+        "rebased_ticks": loop.rebased_ticks if loop is not None else 0,
+        "slipped_s": loop.slipped_ns * 1e-9 if loop is not None else 0.0,
+        "suspended_s": outcome.suspended_s,
+        "granted": got._asdict() if got is not None else None,
     }
-
-
-def percentiles_us(times_ns: list[int]) -> dict[str, float | None]:
-    """p50, p99, p99.9 and max of times in ns, as us; None where nothing was measured (lockstep has no wake-ups)."""
-    names = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
-    if not times_ns:
-        return dict.fromkeys(names)
-    values = np.percentile(np.array(times_ns) * 1e-3, list(names.values()))
-    return {name: round(float(value), 3) for name, value in zip(names, values, strict=True)}
 
 
 def _plain(value: Any) -> Any:
@@ -353,45 +367,3 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if np.isfinite(value) else None
     return value.item() if isinstance(value, np.generic) else value
-
-
-# -- signals -------------------------------------------------------------------------------------------------------
-
-
-class StopRequests:
-    """SIGINT and SIGTERM. Until `hold()` they interrupt at once: nothing was run yet, nothing can be lost. After it the
-    first one is a wish that the loop looks at each tick, so that log and summary are complete; a second one interrupts
-    a loop that does not come round.
-
-    Outside the main thread Python installs no handlers; then nobody asks.
-    """
-
-    def __init__(self) -> None:
-        self._held = False
-        self._asked = 0
-        self._before: dict[int, Any] = {}
-
-    def asked(self) -> bool:
-        """Somebody wants the run to end."""
-        return self._asked > 0
-
-    def hold(self) -> None:
-        """From here on there is something to lose."""
-        self._held = True
-
-    def __enter__(self) -> StopRequests:
-        try:
-            for number in (signal.SIGINT, signal.SIGTERM):
-                self._before[number] = signal.signal(number, self._ask)
-        except ValueError:
-            self._before.clear()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        for number, handler in self._before.items():
-            signal.signal(number, handler)
-
-    def _ask(self, number: int, _: object) -> None:
-        self._asked += 1
-        if not self._held or self._asked > 1:
-            raise KeyboardInterrupt

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 if TYPE_CHECKING:
     from protocol.frames import Reading, Sample
+    from sil.lateness import Wake
 
 Vector = npt.NDArray[np.float64]
 
@@ -90,8 +91,8 @@ class Recorder(Protocol):
     ) -> None:
         """The plant at t_k and the torque that acts from t_k on."""
 
-    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
-        """How late the tick woke up on the wall clock, and how long the board took to answer (-1: no answer)."""
+    def timing(self, tick: int, wake: Wake, answer_ns: int) -> None:
+        """How late the tick woke up on the wall clock and why, and how long the board took to answer (-1: no answer)."""
 
     def commit(self, tick: int) -> None:
         """Everything of this tick has been handed over: one write."""

@@ -25,12 +25,14 @@ class BoardOrder:
     law_file: str
     log: Path | None
     notify: Callable[[str], None]
+    lock_memory: bool = False
 
 
 class BoardHost(Protocol):
     """A board that is plugged in: the lab's end of its link, and a way to see whether it lives."""
 
     link: Link
+    pid: int | None  # of a process that is ours to place and to give a priority
 
     def check_alive(self) -> None:
         """Raises LinkFailure when the board is known to be gone; silence is the caller's to judge."""

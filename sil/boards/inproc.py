@@ -15,6 +15,8 @@ from sil.trouble import LinkFailure, UsageError
 class InprocBoard:
     """A `firmware_sim` board that runs until idle whenever the laboratory waits for a frame; its timer never fires."""
 
+    pid = None
+
     def __init__(self, order: BoardOrder) -> None:
         lab_end, board_end = inproc.pair()
         self.link: Link = lab_end

@@ -37,6 +37,10 @@ class ProcessBoard:
             self.close()
             raise
 
+    @property
+    def pid(self) -> int | None:
+        return self._child.pid if self._child is not None else None
+
     def check_alive(self) -> None:
         assert self._child is not None
         code = self._child.poll()
@@ -89,6 +93,8 @@ class ProcessBoard:
         command = [sys.executable, "-P", "-m", "firmware_sim", "--link", url, "--once", "--parent", str(os.getpid())]
         if order.law_file:
             command += ["--law", order.law_file]
+        if order.lock_memory:
+            command += ["--lock-memory"]
         self._child = subprocess.Popen(
             command,
             stdin=subprocess.DEVNULL,

@@ -9,6 +9,8 @@ from sil.boards import BoardOrder
 class WiredBoard:
     """Opens the lab's end of the link and waits; on a pty it says which device the board has to open."""
 
+    pid = None
+
     def __init__(self, order: BoardOrder) -> None:
         self.link: Link = open_link(order.link_url, listen=False)
         board_url = self.link.peer_url or order.link_url

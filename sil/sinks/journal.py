@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 MAGIC = b"SILJRNL\n"
-VERSION = 1
+VERSION = 2  # 1 had no causes of lateness
 PAYLOAD_LIMIT = 16 * 2**20  # bytes; more is taken for a damaged length
 READ_BLOCK = 2**20
 NO_ANSWER = -1  # TIMING.answer_ns where no answer came
@@ -32,7 +32,7 @@ _HEAD = struct.Struct("<IIB")
 _CRC = struct.Struct("<I")
 _TRUTH = struct.Struct("<16d3iB")
 _LAB_EVENT = struct.Struct("<Hii")
-_TIMING = struct.Struct("<qqI")
+_TIMING = struct.Struct("<qqqqqI")
 _HOUSEKEEPING = struct.Struct("<Bq")
 _PACKET = struct.Struct("<BBH")
 
@@ -45,7 +45,7 @@ class Kind(IntEnum):
     PACKET = 3  # a deterministic frame and its fate
     TRUTH = 4  # the plant at t_k and what acts from t_k on
     LAB_EVENT = 5  # code, a, b
-    TIMING = 6  # wall-clock lateness of one tick
+    TIMING = 6  # wall-clock lateness of one tick, and why
     HOUSEKEEPING = 7  # a housekeeping frame with host time
     SESSION = 8  # a board session started at this tick
     END = 9  # JSON: {"reason": "finished|interrupted|failed|diverged", "ticks": N}
@@ -142,15 +142,27 @@ def read_event(payload: bytes) -> tuple[int, int, int]:
     return code, a, b
 
 
-def timing_payload(lateness_ns: int, answer_ns: int = NO_ANSWER, flags: int = 0) -> bytes:
-    """TIMING: wake-up lateness i64 ns, SAMPLE-to-answer time i64 ns (NO_ANSWER: none came), flags u32."""
-    return _TIMING.pack(lateness_ns, answer_ns, flags)
+class Timing(NamedTuple):
+    """One TIMING record, in ns: what the host's clock says of a tick."""
+
+    lateness_ns: int
+    answer_ns: int  # SAMPLE to COMMAND; NO_ANSWER: none came
+    work_ns: int  # CPU time the laboratory took for the tick before
+    gc_ns: int
+    log_ns: int
+    cause: int  # sil.lateness.Cause
 
 
-def read_timing(payload: bytes) -> tuple[int, int, int]:
-    """(lateness_ns, answer_ns, flags)."""
-    lateness, answer, flags = _TIMING.unpack(payload)
-    return lateness, answer, flags
+def timing_payload(
+    lateness_ns: int, answer_ns: int = NO_ANSWER, work_ns: int = 0, gc_ns: int = 0, log_ns: int = 0, cause: int = 0
+) -> bytes:
+    """TIMING: five i64 ns and the cause u32, as in Timing."""
+    return _TIMING.pack(lateness_ns, answer_ns, work_ns, gc_ns, log_ns, cause)
+
+
+def read_timing(payload: bytes) -> Timing:
+    """The inverse of timing_payload."""
+    return Timing(*_TIMING.unpack(payload))
 
 
 def housekeeping_payload(direction: int, host_ns: int, packet: bytes) -> bytes:

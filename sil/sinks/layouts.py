@@ -146,8 +146,13 @@ TIMING = Layout(
     [
         Field("int64", "lateness_ns", 1, "wake-up after the deadline, ns"),
         Field("int64", "answer_ns", 1, "from SAMPLE sent to COMMAND received, ns; -1: no answer"),
+        Field("int64", "work_ns", 1, "CPU time the laboratory took for the tick before; 0 in lockstep"),
+        Field("int64", "gc_ns", 1, "of it (wall time): garbage collection"),
+        Field("int64", "log_ns", 1, "of it (wall time): the journal's write"),
         Field("uint32", "tick", 1, "tick number"),
-        Field("uint32", "flags", 1, "bits set by the loop"),
+        Field(
+            "uint32", "cause", 1, "late by: 0 nothing, 1 machine, 2 own work, 3 garbage collection, 4 log, 5 an answer"
+        ),
     ],
 )
 

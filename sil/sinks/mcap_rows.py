@@ -181,8 +181,8 @@ class TimingRows:
                 code, a, b = jn.read_event(record.payload)
                 data, topic = layouts.EVENT.pack(tick, a, b, code, 0), "/event"
             elif record.kind == Kind.TIMING:
-                lateness_ns, answer_ns, flags = jn.read_timing(record.payload)
-                data, topic = layouts.TIMING.pack(lateness_ns, answer_ns, tick, flags), "/timing"
+                *times_ns, cause = jn.read_timing(record.payload)
+                data, topic = layouts.TIMING.pack(*times_ns, tick, cause), "/timing"
             else:
                 direction, host_ns, packet = jn.read_housekeeping(record.payload)
                 data = layouts.HOUSEKEEPING.pack(host_ns, packet)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from protocol import frames
+from sil.lateness import Wake
 from sil.signals import Motion, Vector
 from sil.sinks import journal
 from sil.sinks.journal import Journal, Kind
@@ -58,8 +59,9 @@ class JournalRecorder:
         q, w, h, euler, applied = (row.tolist() for row in rows)
         self._journal.add(Kind.TRUTH, tick, journal.truth_payload(q, w, h, euler, applied, setpoint_bam, source))
 
-    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
-        self._journal.add(Kind.TIMING, tick, journal.timing_payload(lateness_ns, answer_ns))
+    def timing(self, tick: int, wake: Wake, answer_ns: int) -> None:
+        late_ns, cause, work_ns, gc_ns, log_ns = wake
+        self._journal.add(Kind.TIMING, tick, journal.timing_payload(late_ns, answer_ns, work_ns, gc_ns, log_ns, cause))
 
     def commit(self, tick: int) -> None:
         self._tick = tick

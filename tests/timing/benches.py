@@ -151,7 +151,7 @@ class Rows:
     def truth(self, motion: Any, applied_Nm: Any, setpoint_bam: Any, source: int, tick: int) -> None:
         self.truths.append((tick, tuple(applied_Nm.tolist()), source))
 
-    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
+    def timing(self, tick: int, wake: Any, answer_ns: int) -> None:
         pass
 
     def commit(self, tick: int) -> None:

@@ -18,7 +18,7 @@ from sil.sinks.journal import Journal, JournalError, Kind, read_journal
 def written(path: Path, ticks: int = 5) -> bytes:
     target = Journal(path)
     for k in range(ticks):
-        target.add(Kind.TIMING, k, jn.timing_payload(k, 2 * k, 1))
+        target.add(Kind.TIMING, k, jn.timing_payload(k, 2 * k, 3, 4, 5, 1))
         target.add(Kind.LAB_EVENT, k, jn.event_payload(k, -1, 1))
         target.commit(k)
     target.close()
@@ -37,7 +37,7 @@ def test_records_come_back_in_order(tmp_path: Path) -> None:
     assert [(r.kind, r.tick) for r in records] == [
         (kind, k) for k in range(3) for kind in (Kind.TIMING, Kind.LAB_EVENT, Kind.COMMIT)
     ]
-    assert jn.read_timing(records[3].payload) == (1, 2, 1)
+    assert jn.read_timing(records[3].payload) == (1, 2, 3, 4, 5, 1)
     assert jn.read_event(records[4].payload) == (1, -1, 1)
 
 
@@ -141,7 +141,7 @@ def test_an_existing_journal_is_never_overwritten(tmp_path: Path) -> None:
     [
         (b"", "expected a journal, got 0 bytes"),
         (b"\x89MCAP0\r\nxxxx", "it starts with"),
-        (b"SILJRNL\n\x09\0\0\0", "expected journal version 1, got 9"),
+        (b"SILJRNL\n\x09\0\0\0", "expected journal version 2, got 9"),
     ],
 )
 def test_foreign_files_are_refused_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
