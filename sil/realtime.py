@@ -35,8 +35,9 @@ class Granted(NamedTuple):
 def granted(clock: Clock, paced: bool, board_pid: int | None) -> Iterator[Granted]:
     """Ask for all that `clock` names, for this process and, where it is ours, the board's; give it back at the end.
 
-    Raises UsageError as refuse_impossible() does. Called when everything is set up: compiling and loading need no priority. The board locks its own memory
+    Called when everything is set up: compiling and loading need no priority. The board locks its own memory
     (`python -m firmware_sim --lock-memory`). A paced run's garbage collector looks only at what the run itself makes.
+    Raises UsageError as refuse_impossible() does.
     """
     refuse_impossible(clock)
     refused: list[str] = []
