@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from sil.lateness import Wake
 from sil.signals import Motion, Vector
 
 
@@ -22,7 +23,7 @@ class Nothing:
     ) -> None:
         """Not kept."""
 
-    def timing(self, tick: int, lateness_ns: int, answer_ns: int) -> None:
+    def timing(self, tick: int, wake: Wake, answer_ns: int) -> None:
         """Not kept."""
 
     def commit(self, tick: int) -> None:
