@@ -1,0 +1,156 @@
+"""Worker processes that fly points: each has one point at a time, and one that dies costs that point only."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from sil.boards.process import child_environment
+from sil.campaign.records import Record, broken
+from sil.trouble import LinkFailure
+
+STOP_S = 5.0
+Order = dict[str, Any]  # point, sets, folder, keep
+
+
+class Worker:
+    """One process, and the point it is at (None: it waits)."""
+
+    def __init__(self, setup: dict[str, Any], log: IO[bytes]) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "sil.campaign.worker", str(os.getpid())],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=log,
+            env={"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", **child_environment()},
+            start_new_session=True,  # Ctrl-C in the terminal is the sweep's to handle
+        )
+        self.order: Order | None = None
+        self.ready = False
+        self._rest = b""
+        self._send(setup)
+
+    @property
+    def stdout(self) -> IO[bytes]:
+        assert self.process.stdout is not None
+        return self.process.stdout
+
+    def fly(self, order: Order) -> None:
+        """Give it a point."""
+        self.order = order
+        self._send(order)
+
+    def lines(self) -> list[dict[str, Any]] | None:
+        """What it said since, whole lines; None when it is gone."""
+        data = os.read(self.stdout.fileno(), 1 << 20)
+        *whole, self._rest = (self._rest + data).split(b"\n")
+        return [json.loads(line) for line in whole] if data else None
+
+    def end(self) -> str:
+        """Wait for a process that closed its output; returns how it ended."""
+        try:
+            code = self.process.wait(STOP_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            code = self.process.wait()
+        for pipe in (self.process.stdin, self.process.stdout):
+            if pipe is not None:
+                _closed(pipe)
+        return f"signal {-code} ({signal.Signals(-code).name})" if code < 0 else f"exit code {code}"
+
+    def _send(self, content: dict[str, Any]) -> None:
+        assert self.process.stdin is not None
+        try:
+            self.process.stdin.write(json.dumps(content).encode() + b"\n")
+            self.process.stdin.flush()
+        except BrokenPipeError:
+            pass  # its output says so in a moment
+
+
+class Pool:
+    """`count` workers; orders go in by submit() while there are idle ones, records come out of poll()."""
+
+    def __init__(self, setup: dict[str, Any], count: int, log: Path) -> None:
+        self._setup, self._log_file = setup, log
+        self._log = open(log, "ab")  # noqa: SIM115
+        self._selector = selectors.DefaultSelector()
+        self._workers: list[Worker] = []
+        self._count = count
+
+    def __enter__(self) -> Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def submit(self, order: Order) -> bool:
+        """Hand the point to an idle worker, or to a new one while there are fewer than `count`; False: all are busy."""
+        worker = next((worker for worker in self._workers if worker.order is None), None)
+        if worker is None:
+            if len(self._workers) >= self._count:
+                return False
+            worker = Worker(self._setup, self._log)
+            self._workers.append(worker)
+            self._selector.register(worker.stdout, selectors.EVENT_READ, worker)
+        worker.fly(order)
+        return True
+
+    def busy(self) -> list[Order]:
+        """Points that are being flown."""
+        return [worker.order for worker in self._workers if worker.order is not None]
+
+    def poll(self, timeout_s: float) -> Iterator[Record]:
+        """Records that came within `timeout_s`. Raises LinkFailure when a worker cannot even start."""
+        for key, _ in self._selector.select(timeout_s):
+            worker: Worker = key.data
+            lines = worker.lines()
+            if lines is None:
+                yield from self._gone(worker)
+                continue
+            for line in lines:
+                if "ready" in line:
+                    worker.ready = True
+                    continue
+                worker.order = None
+                yield Record(**line)
+
+    def close(self) -> None:
+        """End all: idle ones because nothing more comes, busy ones at their next tick; nobody is left behind."""
+        for worker in self._workers:
+            if worker.process.stdin is not None:
+                _closed(worker.process.stdin)
+            if worker.order is not None:
+                worker.process.terminate()
+        give_up = time.monotonic() + STOP_S
+        for worker in self._workers:
+            try:
+                worker.process.wait(max(0.0, give_up - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                worker.process.kill()
+            worker.end()
+        self._workers.clear()
+        self._selector.close()
+        self._log.close()
+
+    def _gone(self, worker: Worker) -> Iterator[Record]:
+        self._selector.unregister(worker.stdout)
+        self._workers.remove(worker)
+        how = worker.end()
+        if not worker.ready:
+            raise LinkFailure(f"sweep: a worker process ended with {how} before it began; see {self._log_file}")
+        if worker.order is not None:
+            yield broken(int(worker.order["point"]), f"the worker process ended with {how}")
+
+
+def _closed(pipe: IO[bytes]) -> None:
+    with contextlib.suppress(BrokenPipeError):
+        pipe.close()

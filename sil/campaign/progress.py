@@ -1,0 +1,86 @@
+"""How far a sweep is and how long it will take: a bar on a terminal, a line every ten seconds elsewhere; on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from typing import Any
+
+from sil.campaign.records import Record
+from sil.campaign.sweep import SweepWatch
+
+PLAIN_EVERY_S = 10.0
+FIRST_PLAIN_S = 2.0  # a sweep that is over sooner needs no line
+
+
+class Terminal(SweepWatch):
+    """Draws only when asked to wait or told of a point; costs nothing in between."""
+
+    def __init__(self) -> None:
+        self._live = sys.stderr.isatty()
+        self._bar: Any = None
+        self._bad: Counter[str] = Counter()
+        self._flown = 0
+
+    def begin(self, name: str, points: int, finished: int, workers: int) -> None:
+        self._name, self._points, self._finished, self._workers = name, points, finished, workers
+        self._began = time.monotonic()
+        self._said = self._began + FIRST_PLAIN_S - PLAIN_EVERY_S
+        if self._live and finished < points:
+            self._start_bar()
+
+    def record(self, record: Record) -> None:
+        self._flown += 1
+        if record.exit_code:
+            self._bad[record.verdict] += 1
+
+    def wait(self) -> None:
+        if self._bar is not None:
+            self._bar.update(
+                self._task, completed=self._done, refresh=True, bad=self._bad_text(), left=f"{self._left()} left"
+            )
+        elif not self._live and time.monotonic() - self._said >= PLAIN_EVERY_S:
+            self._said = time.monotonic()
+            bad = f"  {self._bad_text()}" if self._bad else ""
+            line = f"{self._name}: {self._done}/{self._points} points{bad}  {self._left()} left"
+            print(line, file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
+
+    @property
+    def _done(self) -> int:
+        return self._finished + self._flown
+
+    def _bad_text(self) -> str:
+        return ", ".join(f"{count} {verdict}" for verdict, count in sorted(self._bad.items()))
+
+    def _left(self) -> str:
+        """From the mean time of a point so far; the first round of the workers includes their start."""
+        if not self._flown:
+            return "--:--"
+        seconds = round((time.monotonic() - self._began) / self._flown * (self._points - self._done))
+        minutes, seconds = divmod(seconds, 60)
+        hours, minutes = divmod(minutes, 60)
+        return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+
+    def _start_bar(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TextColumn("{task.fields[left]}", style="cyan"),
+            TextColumn("{task.fields[bad]}", style="red"),
+        )
+        console = Console(stderr=True)
+        self._bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
+        self._task = self._bar.add_task(
+            self._name, total=self._points, completed=self._finished, bad="", left="--:-- left"
+        )
+        self._bar.start()

@@ -1,0 +1,157 @@
+"""A sweep from its plan to its tables: START HERE. Points go to workers, records come back, whoever finishes first.
+
+What stands in the tables depends on the plan alone: not on the number of workers, on their order, nor on how often the
+sweep was interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sil.campaign import provenance, results
+from sil.campaign.conditions import Conditions
+from sil.campaign.plan import Point, make_plan, sets_of
+from sil.campaign.pool import Order, Pool
+from sil.campaign.records import Record, refused
+from sil.campaign.results import RUNS, Results
+from sil.runner import _next_run_dir, new_run_dir
+from sil.scenario import Scenario, load_values
+from sil.stopping import StopRequests
+from sil.trouble import EXIT_INTERRUPTED, UsageError
+
+POLL_S = 0.1
+MOST_WORKERS = 256
+
+
+class SweepWatch:
+    """What a sweep shows of itself while it goes on; this one shows nothing."""
+
+    def begin(self, name: str, points: int, finished: int, workers: int) -> None:
+        """`finished` of `points` were there already (a resumed sweep, refused points)."""
+
+    def record(self, record: Record) -> None:
+        """A point is finished."""
+
+    def wait(self) -> None:
+        """Called ten times a second."""
+
+    def end(self) -> None:
+        """No more points."""
+
+
+def new_sweep(scenario: Scenario, conditions: Conditions, out: Path | None) -> Results:
+    """Plan a sweep and write the plan; raises UsageError before anything is written. out: None: sweeps/NAME-NNN."""
+    plan = make_plan(scenario, conditions)
+    directory = new_run_dir(plan.name, out)[0] if out is not None else _next_run_dir(Path("sweeps"), plan.name)
+    opened = results.create(directory, plan)
+    for point in plan.points:
+        if point.refused:
+            opened.add(refused(point.number, point.refused))
+    return opened
+
+
+def old_sweep(directory: Path, retry_failed: bool = False) -> Results:
+    """A sweep that was begun; raises UsageError where what is here now would not give the results it began with."""
+    opened = results.reopen(directory)
+    try:
+        plan = opened.plan
+        scenario = load_values(plan.scenario, (), f"{directory}/{results.PLAN}", Path(plan.directory))
+        provenance.refuse_changed(plan.provenance, scenario, f"--resume {directory}")
+        if retry_failed:
+            opened.forget_failed()
+        for point in plan.points:
+            if point.refused and point.number not in opened.records:
+                opened.add(refused(point.number, point.refused))
+    except BaseException:
+        opened.close()
+        raise
+    return opened
+
+
+def fly(opened: Results, workers: int | None, keep: str, watch: SweepWatch) -> dict[str, Any]:
+    """Fly what is not finished, write the tables; returns the summary with `interrupted`, `wall_s`, `sweep_dir`.
+
+    workers: None: one for each CPU, one alone where the clock is not lockstep. keep: none, on-fail or all. SIGINT and
+    SIGTERM end the sweep: runs under way are dropped, finished points stay.
+    """
+    began = time.monotonic()
+    waiting = [point for point in opened.plan.points if point.number not in opened.records]
+    count = min(workers or default_workers(opened.plan.scenario), max(1, len(waiting)))
+    _clear(opened.directory, waiting)
+    watch.begin(opened.plan.name, len(opened.plan.points), len(opened.records), count)
+    interrupted = False
+    try:
+        with StopRequests() as stop:
+            stop.hold()
+            interrupted = _fly(opened, waiting, count, keep, watch, stop)
+            summary = opened.finish()
+    finally:
+        watch.end()
+        _clear(opened.directory, [point for point in waiting if point.number not in opened.records])
+        opened.close()
+    if interrupted:
+        summary["exit_code"] = EXIT_INTERRUPTED
+    wall_s = time.monotonic() - began
+    return {
+        **summary,
+        "interrupted": interrupted,
+        "wall_s": wall_s,
+        "workers": count,
+        "sweep_dir": str(opened.directory),
+    }
+
+
+def _fly(
+    opened: Results, waiting: Sequence[Point], count: int, keep: str, watch: SweepWatch, stop: StopRequests
+) -> bool:
+    """True if somebody wanted the sweep to end before its last point."""
+    setup = {"scenario": opened.plan.scenario, "directory": opened.plan.directory}
+    orders = iter([_order(point, opened.directory, keep) for point in waiting])
+    following = next(orders, None)
+    with Pool(setup, count, opened.directory / results.LOG) as pool:
+        while not stop.asked():
+            while following is not None and pool.submit(following):
+                following = next(orders, None)
+            if following is None and not pool.busy():
+                return False
+            for record in pool.poll(POLL_S):
+                opened.add(record)
+                watch.record(record)
+            watch.wait()
+    return True
+
+
+def default_workers(scenario: dict[str, Any]) -> int:
+    """One for each CPU we may use; runs against the wall clock would make each other late, so they go one by one."""
+    lockstep = scenario["clock"]["mode"] == "lockstep"
+    return min(len(os.sched_getaffinity(0)), MOST_WORKERS) if lockstep else 1
+
+
+def checked_workers(workers: int | None) -> int | None:
+    """Raises UsageError for a number of workers nobody can mean."""
+    if workers is not None and not 1 <= workers <= MOST_WORKERS:
+        raise UsageError(f"-j: expected a number of workers from 1 to {MOST_WORKERS}, got {workers}")
+    return workers
+
+
+def _order(point: Point, directory: Path, keep: str) -> Order:
+    folder = _folder(directory, point)
+    return {"point": point.number, "sets": sets_of(point.values), "folder": str(folder.absolute()), "keep": keep}
+
+
+def _folder(directory: Path, point: Point) -> Path:
+    return directory / RUNS / f"{point.number:04d}"
+
+
+def _clear(directory: Path, points: Sequence[Point]) -> None:
+    """Nothing is left of runs that did not finish."""
+    for point in points:
+        shutil.rmtree(_folder(directory, point), ignore_errors=True)
+    runs = directory / RUNS
+    if runs.is_dir() and not any(runs.iterdir()):
+        runs.rmdir()
