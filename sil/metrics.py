@@ -19,6 +19,7 @@ from sil.sinks.journal import Fate
 
 DIVERGED_deg = 80.0  # the scenario's metrics.diverged_deg says otherwise
 MISMATCH_LIMIT_deg = 1e-5  # board's reference against ours: 100 times the LSB of an angle on the wire
+SETTLED_FRACTION, SETTLED_FLOOR_deg = 0.02, 0.1  # settled: within 2 % of the step; never asked closer than this
 PARTS = {"roll": 0, "x": 0, "pitch": 1, "y": 1, "yaw": 2, "z": 2}
 MISMATCH = "reference_mismatch_deg"
 
@@ -37,9 +38,10 @@ def measure(run: Run) -> dict[str, Any]:
     """All metrics of a run by name.
 
     Three numbers each: rms_error_deg, rms_setpoint_error_deg, peak_error_deg, peak_torque_Nm, rms_torque_Nm (applied
-    torque on the body), peak_momentum_Nms. One number: diverged_at_s (first tick with an angle beyond
-    metrics.diverged_deg, default 80 deg, or not a number; None: never), reference_mismatch_deg (largest difference
-    between the board's reference and ours; None: the board reported none), and the counts missed, late, overruns.
+    torque on the body), peak_momentum_Nms, effort_Nms (integral of |applied torque| dt), settling_s (see settling_s).
+    One number: diverged_at_s (first tick with an angle beyond metrics.diverged_deg, default 80 deg, or not a number;
+    None: never), reference_mismatch_deg (largest difference between the board's reference and ours; None: the board
+    reported none), and the counts missed, late, overruns.
     """
     settings = run.scenario.get("metrics") or {}
     first = int(settings.get("from_tick") or 0)
@@ -56,6 +58,8 @@ def measure(run: Run) -> dict[str, Any]:
         "peak_torque_Nm": _peak(torque),
         "rms_torque_Nm": _rms(torque),
         "peak_momentum_Nms": _peak(run.momentum_Nms[rows]),
+        "effort_Nms": _effort(torque, run.period_s),
+        "settling_s": [settling_s(run, axis, first) for axis in range(3)],
         "diverged_at_s": diverged_at_s(run, settings.get("diverged_deg", DIVERGED_deg)),
         MISMATCH: reference_mismatch_deg(run),
         **_counts(run),
@@ -69,6 +73,50 @@ def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | 
     if beyond_deg is not None:
         bad |= (np.abs(angles) > beyond_deg).any(axis=1)
     return float(run.t_s[np.argmax(bad)]) if bad.any() else None
+
+
+def settling_s(run: Run, axis: int, from_tick: int = 0) -> float | None:
+    """How long one axis (0 roll, 1 pitch, 2 yaw) takes to settle after a change of its set-point, s; the longest of all.
+
+    A change at tick k >= from_tick is a step of size s = |new - old|. The axis has settled at the first tick from which
+    on |attitude - set-point| stays within max(2 % of s, 0.1 deg) up to the next change of any axis' set-point, or to
+    the end of the run: that the turn of another axis pushes it out again later is coupling, not settling. It has until
+    its own next change. The time counts from tick k, in whole periods. With from_tick 0 the start of the run is a step
+    from the attitude it starts at.
+
+    None: the axis has no step. Infinite (null in JSON): it did not settle after one of them; no limit from above is
+    met then. A last step that the end of the run cut off sooner than the slowest of the others settled says nothing,
+    and is left out.
+    """
+    start = int(np.searchsorted(run.tick, from_tick))
+    attitude, setpoints = run.attitude_deg[start:], run.setpoint_deg[start:]
+    if not len(setpoints):
+        return None
+    before = run.setpoint_deg[start - 1] if start else attitude[0]
+    steps = np.abs(wrapped_deg(np.diff(setpoints, axis=0, prepend=before[None])))
+    changes = np.flatnonzero(steps[:, axis])
+    if not changes.size:
+        return None
+    error = np.abs(wrapped_deg(attitude[:, axis] - setpoints[:, axis]))
+    ends = np.append(np.flatnonzero(steps.any(axis=1)), len(error))
+    bands = np.maximum(SETTLED_FRACTION * steps[changes, axis], SETTLED_FLOOR_deg)
+    spans = zip(changes, [*changes[1:], len(error)], bands, strict=True)
+    ticks = [_ticks_to_settle(error[k:end], ends[(ends > k) & (ends <= end)] - k, band) for k, end, band in spans]
+    *others, last = ticks
+    if math.isinf(last) and others and len(error) - changes[-1] < max(others) < math.inf:
+        ticks = others
+    return float(max(ticks) * run.period_s)
+
+
+def _ticks_to_settle(error: Array, ends: Array, band: float) -> float:
+    """First index from which on error is within the band up to one of `ends` (in rising order); infinite: never."""
+    outside = np.flatnonzero(~(error <= band))  # what is not a number is outside
+    for end in ends:
+        so_far = outside[outside < end]
+        settled = int(so_far[-1]) + 1 if so_far.size else 0
+        if settled < end:
+            return settled
+    return math.inf
 
 
 def reference_mismatch_deg(run: Run) -> float | None:
@@ -96,7 +144,7 @@ def judge(require: Iterable[Any], metrics: Mapping[str, Any]) -> list[Judgement]
 
 
 def value_of(metrics: Mapping[str, Any], name: str) -> float | None:
-    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `diverged_at_s`; None where there is none."""
+    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `diverged_at_s`; None: there is none."""
     key, _, part = name.partition(".")
     if key not in metrics:
         raise ValueError(f"metric: expected one of {', '.join(metrics)}, got {name!r}")
@@ -104,7 +152,8 @@ def value_of(metrics: Mapping[str, Any], name: str) -> float | None:
     if not isinstance(value, Sequence | np.ndarray):
         return None if value is None else float(value)
     if part == "max":
-        return float(np.max(np.asarray(value, float)))
+        numbers = [number for number in value if number is not None]  # None: this axis has nothing to measure
+        return float(np.max(numbers)) if numbers else None
     if part not in PARTS:
         raise ValueError(f"metric: expected {key}.roll, .pitch, .yaw or .max, got {name!r}")
     number = value[PARTS[part]]
@@ -149,6 +198,11 @@ def _counts(run: Run) -> dict[str, int]:
 
 def _rms(values: Array) -> list[float]:
     return [math.nan] * 3 if not len(values) else [float(v) for v in np.sqrt(np.mean(np.square(values), axis=0))]
+
+
+def _effort(torque_Nm: Array, period_s: float) -> list[float]:
+    """The torque holds for a period, so the sum is the integral."""
+    return [float(v) for v in np.abs(torque_Nm).sum(axis=0) * period_s]
 
 
 def _peak(values: Array) -> list[float]:

@@ -13,6 +13,8 @@ METRICS: dict[str, tuple[str, ...]] = {
     "rms_torque_Nm": AXES,
     "peak_torque_Nm": AXES,
     "peak_momentum_Nms": AXES,
+    "effort_Nms": AXES,
+    "settling_s": ANGLES,
     "diverged_at_s": (),
     "reference_mismatch_deg": (),
     "missed": (),

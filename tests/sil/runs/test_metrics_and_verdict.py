@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from synthetic import synthetic_journal
 
-from sil.metrics import MISMATCH_LIMIT_deg, judge, measure, value_of
+from sil.metrics import MISMATCH_LIMIT_deg, judge, measure, settling_s, value_of
 from sil.runs import Run, open_run
+from sil.scenario_metrics import METRICS as METRIC_NAMES
 from sil.sinks.seal import seal
 
 
@@ -107,3 +108,119 @@ def test_unknown_metrics_are_errors() -> None:
         value_of(METRICS, "rms_error_deg")
     with pytest.raises(ValueError, match="expected below, above or between"):
         judge([{"metric": "missed"}], METRICS)
+
+
+# -- effort and settling -----------------------------------------------------------------------------------------------
+
+
+def responding(attitude_deg: np.ndarray, setpoint_deg: np.ndarray, period_s: float = 0.01) -> Run:
+    """What settling_s reads of a run; (N, 3) each."""
+    ticks = np.arange(len(attitude_deg))
+    fields = {"tick": ticks, "period_s": period_s, "attitude_deg": attitude_deg, "setpoint_deg": setpoint_deg}
+    return SimpleNamespace(**fields)  # type: ignore[return-value]
+
+
+def second_order(t_s: np.ndarray, damping: float, wn: float = 1.0) -> np.ndarray:
+    """The unit step response of wn^2 / (s^2 + 2 damping wn s + wn^2), from its closed form."""
+    t_s = np.maximum(t_s, 0.0)
+    if damping == 1.0:
+        return 1 - (1 + wn * t_s) * np.exp(-wn * t_s)
+    wd = wn * math.sqrt(1 - damping**2)
+    swing = np.cos(wd * t_s) + damping / math.sqrt(1 - damping**2) * np.sin(wd * t_s)
+    return 1 - np.exp(-damping * wn * t_s) * swing
+
+
+def one_step(damping: float, size_deg: float, seconds: float, at_s: float = 1.0) -> Run:
+    t_s = np.arange(round((at_s + seconds) / 0.01)) * 0.01
+    attitude, setpoint = np.zeros((len(t_s), 3)), np.zeros((len(t_s), 3))
+    attitude[:, 1] = size_deg * second_order(t_s - at_s, damping)
+    setpoint[t_s >= at_s - 1e-9, 1] = size_deg
+    return responding(attitude, setpoint)
+
+
+@pytest.mark.parametrize("size_deg", [25.0, -60.0])
+@pytest.mark.parametrize("damping", [0.2, 0.5, 0.7, 1.0])
+def test_settling_is_that_of_the_closed_form(damping: float, size_deg: float) -> None:
+    """Within a period of the instant at which |1 - y| is 2 % for the last time, found on a grid 1,000 times finer."""
+    run = one_step(damping, size_deg, 60.0)
+    fine = np.arange(0.0, 60.0, 1e-5)
+    exact = fine[np.flatnonzero(np.abs(1 - second_order(fine, damping)) > 0.02)[-1]]
+    assert exact <= settling_s(run, 1) <= exact + 0.011
+    assert settling_s(run, 0) is None
+    assert settling_s(run, 1, from_tick=101) is None
+
+
+def test_critical_damping_settles_at_the_textbook_time() -> None:
+    """(1 + x) e^-x = 0.02 at x = 5.834."""
+    assert settling_s(one_step(1.0, 10.0, 20.0), 1) == pytest.approx(5.84, abs=0.006)
+
+
+def test_a_small_step_is_not_asked_closer_than_the_floor() -> None:
+    """0.5 deg: 2 % would be 0.01 deg; 0.1 deg is 20 %: (1 + x) e^-x = 0.2 at x = 2.994."""
+    assert settling_s(one_step(1.0, 0.5, 20.0), 1) == pytest.approx(3.0, abs=0.006)
+
+
+def test_never_settled_is_infinite_and_meets_no_limit() -> None:
+    run = one_step(1.0, 10.0, 5.0)
+    assert settling_s(run, 1) == math.inf
+    judgement = judge([{"metric": "settling_s.max", "below": 1e9}], {"settling_s": [None, math.inf, None]})[0]
+    assert not judgement.passed
+    assert judge([{"metric": "settling_s.roll", "below": 1e9}], {"settling_s": [None, 1.0, None]})[0].passed is False
+
+
+def stepping(changes: dict[int, tuple[float, float, float]], ticks: int) -> Run:
+    """A plant that follows each set-point 20 ticks late, at once; period 1 s."""
+    setpoint = np.zeros((ticks, 3))
+    for tick, value in changes.items():
+        setpoint[tick:] = value
+    attitude = np.vstack([np.zeros((20, 3)), setpoint[:-20]])
+    return responding(attitude, setpoint, 1.0)
+
+
+def test_the_longest_of_several_steps_counts() -> None:
+    run = stepping({100: (10, 0, 0), 200: (-10, 0, 0)}, 300)
+    assert settling_s(run, 0) == 20.0
+    run.attitude_deg[220:237, 0] = 5.0
+    assert settling_s(run, 0) == 37.0
+    run.attitude_deg[220:, 0] = math.nan
+    assert settling_s(run, 0) == math.inf
+
+
+def test_another_axis_turn_is_not_settling() -> None:
+    """Roll settles after 20 s; the pitch step at 150 s throws it out again for 30 s."""
+    run = stepping({100: (10, 0, 0), 150: (10, 30, 0)}, 300)
+    run.attitude_deg[150:180, 0] = 12.0
+    assert settling_s(run, 0) == 20.0
+    assert settling_s(run, 1) == 20.0
+    run.attitude_deg[120:180, 0] = 12.0
+    assert settling_s(run, 0) == 80.0
+
+
+def test_a_step_cut_off_by_the_end_says_nothing_if_it_had_less_time_than_the_others_took() -> None:
+    assert settling_s(stepping({100: (10, 0, 0), 200: (-10, 0, 0)}, 215), 0) == 20.0
+    assert settling_s(stepping({200: (-10, 0, 0)}, 215), 0) == math.inf
+
+
+def test_the_start_is_a_step_where_it_counts() -> None:
+    run = stepping({}, 100)
+    run.attitude_deg[:20] = (10.0, 0.0, 0.05)
+    assert [settling_s(run, axis) for axis in range(3)] == [20.0, None, 0.0]
+    assert [settling_s(run, axis, from_tick=1) for axis in range(3)] == [None] * 3
+    assert settling_s(run, 0, from_tick=1000) is None
+
+
+def test_the_largest_leaves_out_axes_without_a_step() -> None:
+    assert value_of({"settling_s": [None, 3.0, 2.0]}, "settling_s.max") == 3.0
+    assert value_of({"settling_s": [None, None, None]}, "settling_s.max") is None
+    assert math.isnan(value_of({"rms_error_deg": [0.1, math.nan, 0.2]}, "rms_error_deg.max") or 0.0)
+
+
+def test_effort_is_the_integral_of_the_torque_that_acted(run: Run) -> None:
+    metrics = measure(run)
+    assert metrics["effort_Nms"] == pytest.approx((np.abs(run.applied_Nm[20:]).sum(axis=0) * 0.5).tolist())
+    assert run.applied_Nm[20:].min() < 0  # else a plain sum would do
+
+
+def test_a_requirement_may_name_every_metric(run: Run) -> None:
+    """A metric that measure() knows and the scenario refuses could never be required."""
+    assert set(measure(run)) - {"from_tick"} <= set(METRIC_NAMES)
