@@ -13,7 +13,7 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import replay, report, run, scenario, sweep
+from sil.verbs import doctor, replay, report, run, scenario, sweep
 
 app = typer.Typer(
     name="sil",
@@ -32,7 +32,7 @@ VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, report.export, report.diff),
     "Study": (sweep.sweep,),
-    "Prepare": (scenario.scenarios, scenario.check),
+    "Prepare": (scenario.scenarios, scenario.check, doctor.doctor),
 }
 for _panel, _verbs in VERBS.items():
     for _verb in _verbs:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import stat
+import struct
 import termios
 import tty
+from typing import NamedTuple
 from urllib.parse import parse_qs, urlsplit
 
 import serial as pyserial
@@ -15,6 +18,18 @@ from protocol.link import Link, LinkError, StreamLink
 
 DEFAULT_BAUD = 115200
 PTY_MAJORS = range(136, 144)  # Linux: /dev/pts/*
+TIOCGICOUNT = getattr(termios, "TIOCGICOUNT", 0x545D)
+ICOUNT = struct.Struct("20i")  # cts dsr rng dcd rx tx frame overrun parity brk buf_overrun, nine reserved
+
+
+class LineErrors(NamedTuple):
+    """What a UART's driver has counted since it was loaded; `buffer_overrun` is the kernel's buffer, not the chip's."""
+
+    framing: int
+    overrun: int
+    parity: int
+    breaks: int
+    buffer_overrun: int
 
 
 class SerialLink(StreamLink):
@@ -58,6 +73,14 @@ class SerialLink(StreamLink):
         lab = cls(os.ttyname(slave))
         os.close(slave)
         return lab, _Master(master, "serial (pair)")
+
+    def line_errors(self) -> LineErrors | None:
+        """The driver's counters, or None where there are none: a pty, and some USB adapters."""
+        try:
+            counts = ICOUNT.unpack(fcntl.ioctl(self._fd, TIOCGICOUNT, bytes(ICOUNT.size)))
+        except OSError:
+            return None
+        return LineErrors(*counts[6:11])
 
     def close(self) -> None:
         if self._port is not None:

@@ -1,0 +1,103 @@
+"""Findings as lines for a person: a word, a name, what was found; below it what to do, and the command to type."""
+
+from __future__ import annotations
+
+import sys
+import textwrap
+import time
+from collections.abc import Iterable
+from typing import Any
+
+from sil.doctor.findings import NOTE, OK, PROBLEM, Finding
+
+COLOURS = {OK: "green", NOTE: "yellow", PROBLEM: "bold red"}
+STATUS_COLUMN, NAME_COLUMN = 9, 15
+WIDEST = 120  # longer lines are hard to read
+QUIET_S = 2.0  # nothing is said of what takes less
+PLAIN_EVERY_S = 5.0
+
+
+class Page:
+    """Writes findings on stdout as they come. Commands and raw bytes are never folded, so that they can be copied."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+
+        self._console = Console(highlight=False, soft_wrap=True)
+        self._width = min(self._console.width, WIDEST) if self._console.is_terminal else 0
+
+    def show(self, finding: Finding) -> None:
+        """One finding, with an empty line after one that has more than a line."""
+        from rich.text import Text
+
+        colour = COLOURS[finding.status]
+        indent = " " * (STATUS_COLUMN + NAME_COLUMN)
+        first, *more = self._folded(finding.found) or [""]
+        line = Text.assemble(
+            (f"{finding.status:<{STATUS_COLUMN}}", colour), (f"{finding.check:<{NAME_COLUMN}}", "bold")
+        )
+        self._print(line.append(first))
+        for piece in more:
+            self._print(Text(indent + piece))
+        if finding.advice:
+            for piece in self._folded(finding.advice):
+                self._print(Text(indent + piece, style="italic"))
+        for raw in finding.lines:
+            self._print(Text(indent + raw, style="dim"))
+        for command in finding.commands:
+            self._print(Text.assemble(indent, ("$ ", "dim"), (command, "cyan")))
+
+    def summary(self, findings: Iterable[Finding], subject: str) -> None:
+        """The last line: how many of each."""
+        from rich.text import Text
+
+        statuses = [finding.status for finding in findings]
+        problems, notes = statuses.count(PROBLEM), statuses.count(NOTE)
+        word = (f"{problems} problem{'s' * (problems != 1)}", "bold red") if problems else ("no problem", "bold green")
+        said = f", {notes} note{'s' * (notes != 1)}, {statuses.count(OK)} ok" if statuses else ""
+        self._print(Text.assemble("\n", (f"{subject}: ", "bold"), word, said))
+
+    def _folded(self, text: str) -> list[str]:
+        """`text` in pieces that fit; whole where the output is no terminal."""
+        room = self._width - STATUS_COLUMN - NAME_COLUMN
+        if room < 20:
+            return [text]
+        return textwrap.wrap(text, room, break_long_words=False, break_on_hyphens=False)
+
+    def _print(self, text: Any) -> None:
+        self._console.print(text, soft_wrap=True)
+
+
+class Progress:
+    """What is going on, on stderr: a line that is replaced on a terminal, a line every five seconds elsewhere."""
+
+    def __init__(self) -> None:
+        self._began = self._said = time.monotonic()
+        self._status: Any = None
+
+    def tell(self, text: str) -> None:
+        """Say it, if this is taking a while. Cheap: called after every round trip."""
+        now = time.monotonic()
+        if now - self._began < QUIET_S:
+            return
+        if not sys.stderr.isatty():
+            if now - self._said >= PLAIN_EVERY_S:
+                self._said = now
+                print(text, file=sys.stderr, flush=True)
+            return
+        if now - self._said < 0.1 and self._status is not None:
+            return
+        self._said = now
+        if self._status is None:
+            from rich.console import Console
+
+            self._status = Console(stderr=True, highlight=False).status(text)
+            self._status.start()
+        self._status.update(text)
+
+    def clear(self) -> None:
+        """Take it off the terminal, and begin anew: what comes next has a while of its own."""
+        if self._status is not None:
+            self._status.stop()
+            self._status = None
+        self._began = self._said = time.monotonic()
