@@ -13,7 +13,7 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import doctor, replay, report, run, scenario, sweep
+from sil.verbs import bench, doctor, replay, report, run, scenario, sweep
 
 app = typer.Typer(
     name="sil",
@@ -31,7 +31,7 @@ app = typer.Typer(
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, report.export, report.diff),
-    "Study": (sweep.sweep,),
+    "Study": (sweep.sweep, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, doctor.doctor),
 }
 for _panel, _verbs in VERBS.items():

@@ -1,0 +1,85 @@
+"""Time of one law step on the board, Python wrapper included: python -m firmware_sim.law_bench [--json] [--rounds N].
+
+`sil bench law` runs it, since the laboratory does not import the board. Per law and form: the median of many short
+rounds, and beside it, alternating, the same for a compiled function that takes the same arguments and does nothing:
+what calling compiled code from Python costs here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+
+from firmware_sim.controllers import LAWS, inputs, new_law
+from firmware_sim.guidance.reference import Reference
+from protocol.law_tables import config_words, law_by_name, parse_configuration
+
+STEPS = 20  # of a round
+
+
+def main() -> None:
+    """Print the table, or a JSON list of one object per law and form."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--rounds", type=int, default=200, help=f"rounds of {STEPS} steps")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    rows = [law_times(name, form, options.rounds) for name in LAWS for form in ("float", "fixed")]
+    if options.json:
+        print(json.dumps(rows))
+        return
+    print(f"{'law':8}{'form':8}{'step us':>10}{'empty us':>10}{'best us':>10}")
+    for row in rows:
+        print(f"{row['law']:8}{row['form']:8}{row['step_us']:10.2f}{row['empty_us']:10.2f}{row['best_us']:10.2f}")
+
+
+def law_times(name: str, form: str, rounds: int) -> dict[str, Any]:
+    """law, form; step_us and empty_us: medians over the rounds; best_us: the best round's step."""
+    configuration = parse_configuration(config_words(law_by_name(name), {"form": form}))
+    dtype = np.float64 if form == "float" else np.int64
+    law, reference = new_law(name, configuration), Reference(configuration.common, form == "float")
+    inp, out, state, par = (np.zeros(size, dtype) for size in (inputs.SIZE, 4, 100, 50))
+    inp[inputs.FRESH], inp[inputs.GOOD_RUN], inp[inputs.APPLIED_KNOWN] = 1, 100, 1
+    empty = numba.njit(_nothing)
+
+    def bare() -> None:
+        empty(state, par, inp, reference.state, out)
+
+    def step() -> None:
+        law.step(inp, reference.state, out)
+
+    bare()
+    law.warm_up(inp, reference.state, out)
+    steps, empties = [], []
+    for _ in range(rounds):
+        reference.advance(inp)
+        steps.append(_round_us(step))
+        empties.append(_round_us(bare))
+    return {
+        "law": name,
+        "form": form,
+        "step_us": statistics.median(steps),
+        "empty_us": statistics.median(empties),
+        "best_us": min(steps),
+    }
+
+
+def _nothing(state: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
+    """Compiled, it is the price of a call."""
+
+
+def _round_us(call: Callable[[], None]) -> float:
+    began = time.perf_counter()
+    for _ in range(STEPS):
+        call()
+    return (time.perf_counter() - began) / STEPS * 1e6
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""sil bench: what the testbed costs on this machine, beside something comparable in the same minutes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from sil.trouble import EXIT_INTERRUPTED, EXIT_OK
+from sil.verbs.options import JsonOption, print_json
+
+
+def bench(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAMES]...",
+            help="codec, recorder, law, plant, loop, lockstep, wakeup, fast. Default: all of them.",
+        ),
+    ] = None,
+    repeats: Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Interleaved repeats of each figure.")] = 5,
+    quick: Annotated[bool, typer.Option("--quick", help="Short ones: to see that all of it works here.")] = False,
+    as_json: JsonOption = False,
+) -> int:
+    """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
+
+    lockstep against a bare ping-pong on a pty, wakeup and fast against cyclictest (Debian package rt-tests, else a small
+    C loop), plant and loop against Basilisk (pip install 'attitude-sil\\[bench]'), codec, recorder and law against the
+    least that anybody would have to do. All of it takes about 25 minutes; Ctrl-C prints what is finished. Close other
+    programs first: the load is in the table. The exit code says nothing about goals.
+
+    Examples: sil bench --quick | sil bench lockstep plant | sil bench wakeup --repeats 5 --json
+    """
+    from sil.bench import machine
+    from sil.bench.book import Plan
+    from sil.bench.series import run_series
+    from sil.bench.shown import Progress, show
+
+    progress, plan, facts = Progress(), Plan(repeats, quick), machine.facts()
+    try:
+        books, interrupted = run_series(names or (), plan, progress)
+    finally:
+        progress.close()
+    if as_json:
+        head = {"machine": facts, "repeats": repeats, "quick": quick, "interrupted": interrupted}
+        print_json({**head, "benches": {book.name: book.plain() for book in books}})
+    else:
+        show(books, facts, interrupted)
+    return EXIT_INTERRUPTED if interrupted else EXIT_OK
