@@ -76,7 +76,7 @@ def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | 
 
 
 def settling_s(run: Run, axis: int, from_tick: int = 0) -> float | None:
-    """How long one axis (0 roll, 1 pitch, 2 yaw) takes to settle after a change of its set-point, s; the longest of all.
+    """How long one axis (0 roll, 1 pitch, 2 yaw) takes to settle after its set-point changed, s; the longest of all.
 
     A change at tick k >= from_tick is a step of size s = |new - old|. The axis has settled at the first tick from which
     on |attitude - set-point| stays within max(2 % of s, 0.1 deg) up to the next change of any axis' set-point, or to
