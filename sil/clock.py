@@ -1,6 +1,8 @@
 """When a tick happens on the wall: lockstep (as fast as answers come), realtime, scaled:N. Real time is scale 1.
 
-A paced clock wakes at absolute deadlines of CLOCK_MONOTONIC, epoch + t_k / scale, so lateness never accumulates.
+A paced clock wakes at absolute deadlines of CLOCK_MONOTONIC, epoch + t_k / scale, so lateness never accumulates. It
+sleeps to a little before the deadline and reads the clock until it is there: a sleeping CPU takes tens of microseconds
+to run a process again, and its caches are cold.
 A tick that wakes more than a period late re-bases the epoch: ticks are neither skipped nor burst.
 """
 
@@ -50,13 +52,14 @@ class Lockstep:
 
 
 class Scaled:
-    """`scale` simulated seconds per wall second; 1 is real time."""
+    """`scale` simulated seconds per wall second; 1 is real time. The last `spin_ns` before a deadline are not slept."""
 
     paced = True
 
-    def __init__(self, scale: float, now: Callable[[], int] = time.monotonic_ns) -> None:
+    def __init__(self, scale: float, now: Callable[[], int] = time.monotonic_ns, spin_ns: int = 0) -> None:
         self.scale = scale
         self._now = now
+        self._spin_ns = spin_ns
         self._epoch_ns = 0
         _set_timer_slack()
 
@@ -64,24 +67,28 @@ class Scaled:
         self.rebase(first_tick_ns)
 
     def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
-        deadline = self._epoch_ns + int(t_ns / self.scale)
+        deadline, spin_ns = self._epoch_ns + int(t_ns / self.scale), self._spin_ns
         while (left := deadline - self._now()) > 0:
             margin = COARSE_MARGIN_NS if left >= COARSE_NS else MARGIN_NS
             if left > margin:
                 listen((left - margin) * 1e-9)
-            else:
-                time.sleep(left * 1e-9)
+            elif left > spin_ns:
+                time.sleep((left - spin_ns) * 1e-9)
         return self._now() - deadline
 
     def rebase(self, t_ns: int) -> None:
         self._epoch_ns = self._now() - int(t_ns / self.scale)
 
 
-def new_clock(name: str) -> Clock:
-    """`lockstep`, `realtime` or `scaled:N` (the scenario has checked the name)."""
+def new_clock(name: str, period_ns: int = 0, spin_us: int = 0) -> Clock:
+    """`lockstep`, `realtime` or `scaled:N` (the scenario has checked the name).
+
+    spin_us: the last stretch before a deadline that is not slept, at most a tenth of a period on the wall.
+    """
     if name == "lockstep":
         return Lockstep()
-    return Scaled(1.0 if name == "realtime" else float(name.partition(":")[2]))
+    scale = 1.0 if name == "realtime" else float(name.partition(":")[2])
+    return Scaled(scale, spin_ns=min(spin_us * 1000, int(period_ns / scale / 10)))
 
 
 def clock_rate_q16(clock: Clock) -> int:

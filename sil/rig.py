@@ -84,7 +84,7 @@ def assemble(
     channel: what happens to frames on the way; None: the clear channel of `link.baud`. clock: None: the scenario's.
     """
     try:
-        clock = clock or new_clock(scenario.clock.mode)
+        clock = clock or new_clock(scenario.clock.mode, scenario.period_ns, scenario.clock.spin_us)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
         return _with_board(scenario, clock, recorder, log, notify, wired, channel or Clear(scenario.link.baud))

@@ -348,6 +348,8 @@ class Clock(Section):
     """CPU the laboratory runs on; null: the kernel decides."""
     board_cpu: Count | None = None
     """CPU the board process runs on; null: the kernel decides."""
+    spin_us: Annotated[int, Field(ge=0, le=1000)] = 100
+    """The last stretch before a deadline that the laboratory does not sleep, at most a tenth of a period; 0: none."""
 
     @property
     def locks_memory(self) -> bool:

@@ -51,6 +51,26 @@ def test_a_stall_moves_the_epoch_instead_of_a_burst(monkeypatch):
     assert wall.now_ns == 10**9 + 5_000_000_000 + 500_000_000
 
 
+def test_the_last_stretch_is_not_slept(monkeypatch):
+    """A sleeper that is woken 60 us late is still on time, since it asked to be woken 100 us early."""
+    wall = Wall(overshoot_ns=60_000)
+    monkeypatch.setattr("sil.clock.time.sleep", wall.listen)
+
+    def now() -> int:
+        wall.now_ns += 100  # what reading the clock takes
+        return wall.now_ns
+
+    clock = Scaled(1.0, now, spin_ns=100_000)
+    clock.start(0)
+    assert max(clock.wait(k * 10_000_000, wall.listen) for k in range(1, 50)) <= 200
+
+
+def test_the_stretch_is_at_most_a_tenth_of_a_period_on_the_wall():
+    assert new_clock("scaled:1000", 500_000_000, 100)._spin_ns == 50_000
+    assert new_clock("realtime", 500_000_000, 100)._spin_ns == 100_000
+    assert new_clock("realtime", 500_000_000, 0)._spin_ns == 0
+
+
 def test_names():
     assert not new_clock("lockstep").paced
     assert new_clock("realtime").scale == 1.0
