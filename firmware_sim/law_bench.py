@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import statistics
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numba
@@ -44,23 +45,23 @@ def law_times(name: str, form: str, rounds: int) -> dict[str, Any]:
     configuration = parse_configuration(config_words(law_by_name(name), {"form": form}))
     dtype = np.float64 if form == "float" else np.int64
     law, reference = new_law(name, configuration), Reference(configuration.common, form == "float")
-    inp, out, state, par = (np.zeros(size, dtype) for size in (inputs.SIZE, 4, 100, 50))
-    inp[inputs.FRESH], inp[inputs.GOOD_RUN], inp[inputs.APPLIED_KNOWN] = 1, 100, 1
+    ticks = _inputs(configuration.common, dtype)
+    out, state, par = (np.zeros(size, dtype) for size in (4, 100, 50))
     empty = numba.njit(_nothing)
 
-    def bare() -> None:
+    def bare(inp: np.ndarray) -> None:
         empty(state, par, inp, reference.state, out)
 
-    def step() -> None:
+    def step(inp: np.ndarray) -> None:
         law.step(inp, reference.state, out)
 
-    bare()
-    law.warm_up(inp, reference.state, out)
+    bare(ticks[0])
+    law.warm_up(ticks[0], reference.state, out)
     steps, empties = [], []
     for _ in range(rounds):
-        reference.advance(inp)
-        steps.append(_round_us(step))
-        empties.append(_round_us(bare))
+        reference.advance(ticks[0])
+        steps.append(_round_us(step, ticks))
+        empties.append(_round_us(bare, ticks))
     return {
         "law": name,
         "form": form,
@@ -74,11 +75,24 @@ def _nothing(state: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarra
     """Compiled, it is the price of a call."""
 
 
-def _round_us(call: Callable[[], None]) -> float:
+def _inputs(common: Mapping[str, int], dtype: type) -> list[np.ndarray]:
+    """What a law is given in STEPS ticks: every reading there, angles and torque moving, so that it identifies."""
+    ticks = []
+    for k in range(STEPS):
+        inp = np.zeros(inputs.SIZE)
+        phase = 2.0 * math.pi * k / STEPS
+        inp[inputs.FRESH], inp[inputs.GOOD_RUN], inp[inputs.APPLIED_KNOWN], inp[inputs.TICK] = 1, 100, 1, k
+        inp[inputs.EULER] = [0.1 * math.sin(phase + axis) for axis in range(3)]
+        inp[inputs.APPLIED] = [-0.02 * math.sin(phase + axis) for axis in range(3)]
+        ticks.append(inp if dtype is np.float64 else np.rint(inp / inputs.si_scale(common)).astype(dtype))
+    return ticks
+
+
+def _round_us(call: Callable[[np.ndarray], None], ticks: list[np.ndarray]) -> float:
     began = time.perf_counter()
-    for _ in range(STEPS):
-        call()
-    return (time.perf_counter() - began) / STEPS * 1e6
+    for inp in ticks:
+        call(inp)
+    return (time.perf_counter() - began) / len(ticks) * 1e6
 
 
 if __name__ == "__main__":

@@ -2,8 +2,8 @@
 
 Basilisk (https://avslab.github.io/basilisk) integrates the orbit together with the attitude; ours has a circular orbit
 in closed form. Free, or in orbit with gravity gradient and a constant external torque, both end at the same attitude
-(angle_to says how close). The Python law is a plain PD on the readings of `simpleNav`, without arrays, which is as little
-as a Python module can do; its torque acts as an external one, so Basilisk has no wheels to integrate, ours has.
+(angle_to says how close). The Python law is a plain PD on the readings of `simpleNav`, without arrays: as little as a
+Python module can do. Its torque acts as an external one, so Basilisk has no wheels to integrate, ours has.
 """
 
 from __future__ import annotations

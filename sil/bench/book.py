@@ -1,7 +1,7 @@
 """What a bench writes down: lines of repeats, ours and what ran beside it, with medians, spreads, ratios and goals.
 
-ratio = ours / beside, one per repeat: both figures of a repeat were measured right after each other, so most of what the
-machine does to one it does to the other. A line with repeats that were not all made (Ctrl-C) is as good as its repeats.
+ratio = ours / beside, one per repeat: both figures of a repeat were measured right after each other, so most of what
+the machine does to one it does to the other. A line whose repeats were not all made (Ctrl-C) is as good as those made.
 """
 
 from __future__ import annotations

@@ -43,8 +43,8 @@ def run_child(
 ) -> Said:
     """What `command` said; its exit code must be one of `good`. environment: None for ours.
 
-    The child gets 1 ns of timer slack, like our own processes, and SIGTERM when this process dies. When the wait ends by
-    an exception (Ctrl-C), the child is ended first. Raises ChildFailed.
+    The child gets 1 ns of timer slack, like our own processes, and SIGTERM when this process dies. When the wait ends
+    by an exception (Ctrl-C), the child is ended first. Raises ChildFailed.
     """
     try:
         child = subprocess.Popen(

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from protocol.frames import STOP_DONE
 from sil.bench.children import ChildFailed, run_child, sil_command
+from sil.boards.process import child_environment
 from sil.rig import assemble
 from sil.runner import run_scenario
 from sil.scenario import Scenario, load_scenario
@@ -58,7 +59,7 @@ def paced(file: Path, folder: Path, keys: Sequence[str], wall_s: float) -> Paced
     """`sil run FILE` in a process of its own, as a user starts it. Raises ChildFailed."""
     sets = [part for key in keys for part in ("--set", key)]
     command = sil_command("run", str(file), "--out", str(folder), "--json", *sets)
-    said = run_child(command, wall_s + START_S, EXIT_CODES)
+    said = run_child(command, wall_s + START_S, EXIT_CODES, child_environment())
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except FileNotFoundError:

@@ -4,8 +4,8 @@ T_s 0.5 s and RK4 steps of 0.05 s on both sides, rigid satellite in orbit with g
 
 ours    plant, wheels with limits, sensors with noise and quantisation, frames with COBS and CRC both ways, board with
         reference model and law, the transport delay of one tick; over a pty also a second process and the log on disk.
-beside  Basilisk's spacecraft, gravity gradient, simpleNav and external torque in C++, a PD of three lines in Python, and
-        two message recorders in memory, all in one process. No wheels, frames, delay, reference model or log.
+beside  Basilisk's spacecraft, gravity gradient, simpleNav and external torque in C++, a PD of three lines in Python,
+        and two message recorders in memory, all in one process. No wheels, frames, delay, reference model or log.
 
 Times are those of the loop alone: no start, no sealing of the log here, no reading of the recorders there.
 """

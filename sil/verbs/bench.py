@@ -24,10 +24,12 @@ def bench(
 ) -> int:
     """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
 
-    lockstep against a bare ping-pong on a pty, wakeup and fast against cyclictest (Debian package rt-tests, else a small
-    C loop), plant and loop against Basilisk (pip install 'attitude-sil\\[bench]'), codec, recorder and law against the
-    least that anybody would have to do. All of it takes about 25 minutes; Ctrl-C prints what is finished. Close other
-    programs first: the load is in the table. The exit code says nothing about goals.
+    lockstep: against a bare ping-pong on a pty. wakeup, fast: against cyclictest (Debian package rt-tests), else a small
+    C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the least
+    that anybody would have to do.
+
+    All of it takes about 25 minutes; Ctrl-C prints what is finished. Close other programs first: the machine's load is
+    in the table. The exit code says nothing about goals.
 
     Examples: sil bench --quick | sil bench lockstep plant | sil bench wakeup --repeats 5 --json
     """
