@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,6 +24,8 @@ from sil.checks import check
 from sil.scenario import Scenario, load_values
 from sil.scenario_errors import UNKNOWN_KEY, ScenarioInvalid
 from sil.trouble import UsageError
+
+Planning = Callable[[int, int], None]
 
 FORMAT = 1
 MOST_REFUSED = 1000  # draws in a row
@@ -76,8 +78,11 @@ class Plan:
         return json.dumps(head, indent=2).removesuffix("\n}") + f',\n  "points": [\n{points}\n  ]\n}}\n'
 
 
-def make_plan(scenario: Scenario, conditions: Conditions) -> Plan:
-    """The plan of a sweep of `scenario` under `conditions`; raises UsageError where it makes no sense."""
+def make_plan(scenario: Scenario, conditions: Conditions, planning: Planning = lambda done, of: None) -> Plan:
+    """The plan of a sweep of `scenario` under `conditions`; raises UsageError where it makes no sense.
+
+    planning: told how far it is, (points, of how many); 100,000 points take minutes.
+    """
     directory = provenance.directory_of(scenario)
     base = variable_values({**scenario.resolved(), "out": None})
     axes = _axes(base, conditions)
@@ -88,7 +93,7 @@ def make_plan(scenario: Scenario, conditions: Conditions) -> Plan:
     if drawn:
         if conditions.draws is None:
             raise UsageError(f"-n: expected how many draws to make, since {drawn[0].key} is drawn; got nothing")
-        draws = _drawn(made, cells, drawn, conditions)
+        draws = _drawn(made, cells, drawn, conditions, planning)
     elif conditions.draws is not None or conditions.sample is not None:
         known = "uniform(a,b), log(a,b), normal(m,s), choice(a,b)"
         raise UsageError(f"--sample, -n: expected a drawn axis to sample, got listed values only; known: {known}")
@@ -96,7 +101,7 @@ def make_plan(scenario: Scenario, conditions: Conditions) -> Plan:
         draws = [{}]
     combined = [{**cell, **draw} for cell in cells for draw in draws]
     ordered = [{axis.key: values[axis.key] for axis in axes} for values in combined]
-    points = tuple(Point(i, values, made.refusal(values)) for i, values in enumerate(ordered, start=1))
+    points = tuple(_points(made, ordered, planning))
     if all(point.refused for point in points):
         raise UsageError(f"no point of the sweep can be flown; the first: {points[0].refused}")
     sample = {}
@@ -181,8 +186,14 @@ class _Maker:
                         raise UsageError(_as_axis(str(problem))) from None
 
 
+def _points(made: _Maker, values: Sequence[dict[str, Any]], planning: Planning) -> Iterator[Point]:
+    for number, each in enumerate(values, start=1):
+        planning(number, len(values))
+        yield Point(number, each, made.refusal(each))
+
+
 def _drawn(
-    made: _Maker, cells: list[dict[str, Any]], drawn: Sequence[Axis], conditions: Conditions
+    made: _Maker, cells: list[dict[str, Any]], drawn: Sequence[Axis], conditions: Conditions, planning: Planning
 ) -> list[dict[str, Any]]:
     """n draws, each of which at least one cell can fly."""
     assert conditions.draws is not None
@@ -191,6 +202,7 @@ def _drawn(
     keys = [axis.key for axis in drawn]
     for row in rows(conditions.sample or "random", conditions.seed, keys, conditions.draws):
         draw = {axis.key: axis.draw(u) for axis, u in zip(drawn, row, strict=True) if axis.draw is not None}
+        planning(len(accepted), conditions.draws)
         reasons = _until_one_flies(made, cells, draw)
         if not reasons:
             accepted.append(draw)

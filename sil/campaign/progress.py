@@ -22,12 +22,18 @@ class Terminal(SweepWatch):
         self._bar: Any = None
         self._bad: Counter[str] = Counter()
         self._flown = 0
+        self._said = time.monotonic() + FIRST_PLAIN_S - PLAIN_EVERY_S
 
-    def begin(self, name: str, points: int, finished: int, workers: int) -> None:
-        self._name, self._points, self._finished, self._workers = name, points, finished, workers
+    def planning(self, points: int, of: int) -> None:
+        if time.monotonic() - self._said >= PLAIN_EVERY_S:
+            self._said = time.monotonic()
+            print(f"planning: {points}/{of}", file=sys.stderr, flush=True)
+
+    def begin(self, name: str, points: int, workers: int) -> None:
+        self._name, self._points, self._workers = name, points, workers
         self._began = time.monotonic()
         self._said = self._began + FIRST_PLAIN_S - PLAIN_EVERY_S
-        if self._live and finished < points:
+        if self._live and points:
             self._start_bar()
 
     def record(self, record: Record) -> None:
@@ -38,22 +44,18 @@ class Terminal(SweepWatch):
     def wait(self) -> None:
         if self._bar is not None:
             self._bar.update(
-                self._task, completed=self._done, refresh=True, bad=self._bad_text(), left=f"{self._left()} left"
+                self._task, completed=self._flown, refresh=True, bad=self._bad_text(), left=f"{self._left()} left"
             )
         elif not self._live and time.monotonic() - self._said >= PLAIN_EVERY_S:
             self._said = time.monotonic()
             bad = f"  {self._bad_text()}" if self._bad else ""
-            line = f"{self._name}: {self._done}/{self._points} points{bad}  {self._left()} left"
+            line = f"{self._name}: {self._flown}/{self._points} points{bad}  {self._left()} left"
             print(line, file=sys.stderr, flush=True)
 
     def end(self) -> None:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
-
-    @property
-    def _done(self) -> int:
-        return self._finished + self._flown
 
     def _bad_text(self) -> str:
         return ", ".join(f"{count} {verdict}" for verdict, count in sorted(self._bad.items()))
@@ -62,7 +64,7 @@ class Terminal(SweepWatch):
         """From the mean time of a point so far; the first round of the workers includes their start."""
         if not self._flown:
             return "--:--"
-        seconds = round((time.monotonic() - self._began) / self._flown * (self._points - self._done))
+        seconds = round((time.monotonic() - self._began) / self._flown * (self._points - self._flown))
         minutes, seconds = divmod(seconds, 60)
         hours, minutes = divmod(minutes, 60)
         return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
@@ -80,7 +82,5 @@ class Terminal(SweepWatch):
         )
         console = Console(stderr=True)
         self._bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
-        self._task = self._bar.add_task(
-            self._name, total=self._points, completed=self._finished, bad="", left="--:-- left"
-        )
+        self._task = self._bar.add_task(self._name, total=self._points, bad="", left="--:-- left")
         self._bar.start()

@@ -26,7 +26,7 @@ from sil.campaign.plan import Plan, read_plan
 from sil.campaign.records import Record
 from sil.campaign.statistics import summarise
 from sil.scenario_metrics import METRICS
-from sil.trouble import UsageError
+from sil.trouble import EXIT_LINK, UsageError
 
 PLAN, LINES, RUNS, LOG = "plan.json", "results.jsonl", "runs", "workers.log"
 CSV, JSON, SUMMARY = "results.csv", "results.json", "summary.json"
@@ -49,7 +49,7 @@ class Results:
 
     def forget_failed(self) -> int:
         """Points that failed for link, board or worker count as not run; returns how many."""
-        failed = [number for number, record in self.records.items() if record.exit_code == 3]
+        failed = [number for number, record in self.records.items() if record.exit_code == EXIT_LINK]
         for number in failed:
             del self.records[number]
         return len(failed)

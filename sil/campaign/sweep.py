@@ -31,8 +31,11 @@ MOST_WORKERS = 256
 class SweepWatch:
     """What a sweep shows of itself while it goes on; this one shows nothing."""
 
-    def begin(self, name: str, points: int, finished: int, workers: int) -> None:
-        """`finished` of `points` were there already (a resumed sweep, refused points)."""
+    def planning(self, points: int, of: int) -> None:
+        """So many points (or draws) were held against the scenario."""
+
+    def begin(self, name: str, points: int, workers: int) -> None:
+        """So many points are going to be flown."""
 
     def record(self, record: Record) -> None:
         """A point is finished."""
@@ -44,9 +47,9 @@ class SweepWatch:
         """No more points."""
 
 
-def new_sweep(scenario: Scenario, conditions: Conditions, out: Path | None) -> Results:
+def new_sweep(scenario: Scenario, conditions: Conditions, out: Path | None, watch: SweepWatch | None = None) -> Results:
     """Plan a sweep and write the plan; raises UsageError before anything is written. out: None: sweeps/NAME-NNN."""
-    plan = make_plan(scenario, conditions)
+    plan = make_plan(scenario, conditions, (watch or SweepWatch()).planning)
     directory = new_run_dir(plan.name, out)[0] if out is not None else _next_run_dir(Path("sweeps"), plan.name)
     opened = results.create(directory, plan)
     for point in plan.points:
@@ -73,17 +76,19 @@ def old_sweep(directory: Path, retry_failed: bool = False) -> Results:
     return opened
 
 
-def fly(opened: Results, workers: int | None, keep: str, watch: SweepWatch) -> dict[str, Any]:
+def fly(
+    opened: Results, workers: int | None, keep: str, watch: SweepWatch, again: Sequence[int] = ()
+) -> dict[str, Any]:
     """Fly what is not finished, write the tables; returns the summary with `interrupted`, `wall_s`, `sweep_dir`.
 
     workers: None: one for each CPU, one alone where the clock is not lockstep. keep: none, on-fail or all. SIGINT and
-    SIGTERM end the sweep: runs under way are dropped, finished points stay.
+    SIGTERM end the sweep: runs under way are dropped, finished points stay. again: these points only, finished or not.
     """
     began = time.monotonic()
-    waiting = [point for point in opened.plan.points if point.number not in opened.records]
+    waiting = _chosen(opened, again) if again else [p for p in opened.plan.points if p.number not in opened.records]
     count = min(workers or default_workers(opened.plan.scenario), max(1, len(waiting)))
     _clear(opened.directory, waiting)
-    watch.begin(opened.plan.name, len(opened.plan.points), len(opened.records), count)
+    watch.begin(opened.plan.name, len(waiting), count)
     interrupted = False
     try:
         with StopRequests() as stop:
@@ -104,6 +109,17 @@ def fly(opened: Results, workers: int | None, keep: str, watch: SweepWatch) -> d
         "workers": count,
         "sweep_dir": str(opened.directory),
     }
+
+
+def _chosen(opened: Results, numbers: Sequence[int]) -> list[Point]:
+    """Points that are to be flown whether they are finished or not; they keep their records until they are."""
+    points = opened.plan.points
+    for number in numbers:
+        if not 1 <= number <= len(points):
+            raise UsageError(f"--again: expected a point from 1 to {len(points)}, got {number}")
+        if points[number - 1].refused:
+            raise UsageError(f"--again: expected a point that can be flown, got {number}: {points[number - 1].refused}")
+    return [points[number - 1] for number in sorted(set(numbers))]
 
 
 def _fly(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,6 +16,8 @@ from sil.scenario_errors import shown
 
 MOST_ROWS = 40
 MOST_REASONS = 5
+MOST_NUMBERS = 6  # of points beside a reason
+GOT = re.compile(r", got [^;]*")
 COLOURS = {"passed": "green", "interrupted": "yellow", "degraded": "yellow"}
 METRICS = (  # key, label, unit, scale
     ("rms_error_deg.max", "rms error to reference", "deg", 1.0),
@@ -75,7 +78,7 @@ def _metrics(metrics: Mapping[str, Any]) -> Table:
 
 def _cells(plan: Plan, cells: Sequence[Mapping[str, Any]]) -> Table:
     """A row for each cell: how many passed, and the error of the worst axis over its seeds and draws."""
-    table = _table(*_short(plan.cell_keys), ">passed", ">rms median", ">p95", ">max", ">peak max")
+    table = _table(*_short(plan.cell_keys), ">passed", ">rms median", ">p95", ">max", ">peak")
     for cell in cells[:MOST_ROWS]:
         verdicts, metrics = cell["verdicts"], cell["metrics"]
         rms, peak = metrics.get("rms_error_deg.max"), metrics.get("peak_error_deg.max")
@@ -84,7 +87,7 @@ def _cells(plan: Plan, cells: Sequence[Mapping[str, Any]]) -> Table:
         colour = "green" if passed == all_ else "red"
         values = [escape(_value(value)) for value in cell["values"].values()]
         table.add_row(*values, f"[{colour}]{passed}/{all_}[/]", *row, _number(peak["max"] if peak else None))
-    table.caption = "error to reference in deg, worst axis"
+    table.caption = "error to reference in deg, worst axis: rms over the runs of a row, and the largest peak"
     if len(cells) > MOST_ROWS:
         table.caption += f"; {len(cells) - MOST_ROWS} more cells in summary.json"
     return table
@@ -92,7 +95,7 @@ def _cells(plan: Plan, cells: Sequence[Mapping[str, Any]]) -> Table:
 
 def _points(plan: Plan, records: Sequence[Record]) -> Table:
     """A row for each point of a small grid."""
-    table = _table(">point", *_short(plan.cell_keys), "verdict", ">rms error", ">peak error", ">peak torque")
+    table = _table(">point", *_short(plan.cell_keys), "verdict", ">rms", ">peak", ">torque")
     for record in records:
         values = plan.points[record.point - 1].values
         metrics = record.metrics
@@ -104,17 +107,24 @@ def _points(plan: Plan, records: Sequence[Record]) -> Table:
             _number(metrics.get("peak_error_deg.max")),
             _number(metrics.get("peak_torque_Nm.max"), 1e3),
         )
-    table.caption = "worst axis; error to reference in deg, torque in mN m"
+    table.caption = "worst axis: rms and peak error to reference in deg, peak torque in mN m"
     return table
 
 
 def _reasons(console: Console, records: Sequence[Record]) -> None:
-    bad = [record for record in records if record.reason]
-    for record in bad[:MOST_REASONS]:
-        colour = COLOURS.get(record.verdict, "red")
-        console.print(f"[{colour}]{record.verdict}[/]  point {record.point}: {escape(record.reason)}", soft_wrap=True)
-    if len(bad) > MOST_REASONS:
-        console.print(f"[dim]and {len(bad) - MOST_REASONS} more, with their reasons in results.csv[/]")
+    """Points that did not pass, together where the reason is the same but for the number."""
+    groups: dict[tuple[str, str], list[Record]] = {}
+    for record in records:
+        if record.reason:
+            groups.setdefault((record.verdict, GOT.sub("", record.reason)), []).append(record)
+    for (verdict, text), those in list(groups.items())[:MOST_REASONS]:
+        numbers = [str(record.point) for record in those[:MOST_NUMBERS]] + ["..."] * (len(those) > MOST_NUMBERS)
+        which = f"{len(those)} points" if len(those) > 1 else "point"
+        reason = text if len(those) > 1 else those[0].reason
+        start = f"[{COLOURS.get(verdict, 'red')}]{verdict}[/]  {which} {', '.join(numbers)}: "
+        console.print(start + escape(reason), soft_wrap=True)
+    if len(groups) > MOST_REASONS:
+        console.print(f"[dim]and {len(groups) - MOST_REASONS} more reasons, in results.csv[/]")
 
 
 def _table(*headers: str) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +14,7 @@ from sil.verbs.options import ClockOption, JsonOption, LinkOption, SetOption, pr
 
 if TYPE_CHECKING:
     from sil.campaign.results import Results
+    from sil.campaign.sweep import SweepWatch
     from sil.scenario import Scenario
 
 KEEP = ("none", "on-fail", "all")
@@ -62,6 +64,10 @@ def sweep(
         bool,
         typer.Option("--retry-failed", help="With --resume: fly points again that failed for link, board, worker."),
     ] = False,
+    again: Annotated[
+        list[int] | None,
+        typer.Option("--again", metavar="N", help="With --resume: fly this point once more, keep its run. Repeatable."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Run a scenario many times: a grid of values, seeds, or conditions drawn at random; one table of results.
@@ -90,14 +96,14 @@ def sweep(
     if resume is not None:
         if scenario is not None or any((vary, vary_file, draws, sample, seed, set_, clock, link, board, out)):
             raise UsageError(f"--resume: expected -j, --keep, --json beside it, since {resume}/plan.json says the rest")
-        return _fly(old_sweep(resume, retry_failed), workers, keep, as_json)
-    if retry_failed:
-        raise UsageError("--retry-failed: expected --resume DIR beside it, got none")
+        return _fly(old_sweep(resume, retry_failed), workers, "all" if again else keep, as_json, again or ())
+    if retry_failed or again:
+        raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")
     if scenario is None:
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
     base = _base(scenario, [*conditions.sets, *(set_ or ())], clock=clock, link=link, board=board)
-    return _fly(new_sweep(base, conditions, out), workers, keep, as_json)
+    return _fly(new_sweep(base, conditions, out, _watch(as_json)), workers, keep, as_json)
 
 
 def _base(name: str, sets: list[str], clock: str | None, link: str | None, board: str | None) -> Scenario:
@@ -110,18 +116,27 @@ def _base(name: str, sets: list[str], clock: str | None, link: str | None, board
     return scenario_from(name, [*before, *sets], clock=clock, link=link, board=board)
 
 
-def _fly(opened: Results, workers: int | None, keep: str, as_json: bool) -> int:
+def _watch(as_json: bool) -> SweepWatch:
     from sil.campaign.progress import Terminal
-    from sil.campaign.sweep import SweepWatch, fly
+    from sil.campaign.sweep import SweepWatch
+
+    return SweepWatch() if as_json else Terminal()
+
+
+def _fly(opened: Results, workers: int | None, keep: str, as_json: bool, again: Sequence[int] = ()) -> int:
+    from sil.campaign.sweep import fly
     from sil.campaign.table import show
 
     if opened.torn:
         print(f"{opened.torn} damaged lines of results.jsonl: their points are flown again", file=sys.stderr)
-    summary = fly(opened, workers, keep, SweepWatch() if as_json else Terminal())
+    summary = fly(opened, workers, keep, _watch(as_json), again)
     if as_json:
         print_json(summary)
     else:
         show(summary, opened.plan, [opened.records[number] for number in sorted(opened.records)])
+    for number in again:
+        if (record := opened.records.get(number)) is not None and record.run_dir:
+            print(f"point {number}: {opened.directory / record.run_dir}", file=sys.stderr)
     _say_how_to_go_on(summary)
     return int(summary["exit_code"])
 
