@@ -1,4 +1,4 @@
-"""The built-in scenarios: package data, found by name."""
+"""The built-in scenarios, package data found by name, and the JSON Schema that they follow."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 DIRECTORY = Path(__file__).resolve().parent
+SCHEMA = DIRECTORY / "scenario.schema.json"  # made by `python -m sil.scenario_schema`, kept equal by a test
 
 
 class ScenarioInfo(NamedTuple):
