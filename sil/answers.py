@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 from protocol import events, frames
 from protocol.channel import TO_BOARD, TO_LAB, Channel, Fate
-from protocol.frames import Command, Packet, Sample, Tick, Type
+from protocol.frames import Command, Packet, Sample, Telemetry, Tick, Type
 from protocol.port import Port
 from sil.commands import CommandWindow, ExecutionModel
 from sil.signals import Recorder
@@ -54,6 +54,7 @@ class Answers:
         self._advanced_wall_ns = time.monotonic_ns()
         self.answer_ns: list[int] = []
         self.last_answer_ns = NO_ANSWER
+        self.telemetry: Telemetry | None = None  # the newest that came, for whoever watches
         self.strays = 0  # frames that belong to no answer under way: repeated, too old, too far ahead; dropped
         self._sample_size = 0  # bytes on the wire
 
@@ -185,6 +186,8 @@ class Answers:
         self._followers -= 1
         self._advanced_wall_ns = time.monotonic_ns()
         outcome = Outcome.DELIVERED if self._fate(packet).delivered else Outcome.DROPPED
+        if packet.type == Type.TELEMETRY and outcome is Outcome.DELIVERED:
+            self.telemetry = packet.frame
         self._recorder.packet(packet.tick, Direction.DOWN, outcome, packet.raw)
 
     def _fate(self, packet: Packet) -> Fate:

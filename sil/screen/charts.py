@@ -1,0 +1,93 @@
+"""Histories of a run: the one-line ones beside the numbers, and line charts per axis where the window has room."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.text import Text
+
+from sil.screen import marks
+from sil.screen.messages import error_deg
+from sil.screen.palette import AXES, DIM, TONES
+from sil.screen.seen import Seen
+
+LABEL = 8  # columns of the numbers beside a chart
+LEAST_SPAN_DEG = 1e-3  # less is drawn as nothing
+GAP = 2
+
+Points = list[tuple[float, float]]
+
+
+def worth_drawing(seen: Seen) -> bool:
+    """A line needs two points."""
+    return len(seen.samples) >= 2
+
+
+def peaks(seen: Seen, width: int) -> list[tuple[list[float | None], float]]:
+    """Per axis, the largest |error| (|attitude| without a reference) in each of `width` parts of the run so far."""
+    now = seen.samples[-1][0] if seen.samples else 0.0
+    count = min(width, max(len(seen.samples), 1))
+    result = []
+    for axis in range(3):
+        points = [(t, abs(y)) for t, y in _curve(seen, "error" if seen.plan.follows else "attitude", axis)]
+        values = marks.binned(points, 0.0, now, count)
+        top = max((y for _, y in points if math.isfinite(y)), default=0.0)
+        wide = [values[place * count // width] for place in range(width)]
+        result.append((wide, top))
+    return result
+
+
+def row(seen: Seen, which: str, width: int, height: int) -> list[Text]:
+    """Charts of roll, pitch and yaw side by side: `attitude` with its reference, or the `error`; `height` lines."""
+    each = (width - 2 * GAP) // 3
+    columns = [_chart(seen, which, axis, each, height) for axis in range(3)]
+    rows = []
+    for place in range(height):
+        line = Text("")
+        for axis in range(3):
+            line.append_text(columns[axis][place]).append(" " * GAP if axis < 2 else "")
+        rows.append(line)
+    return rows
+
+
+def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[Text]:
+    """Title, braille lines with the numbers of top and bottom, and the axis of time; all `width` characters long."""
+    curve = _curve(seen, which, axis)
+    series = [_curve(seen, "reference", axis), curve] if which == "attitude" and seen.plan.follows else [curve]
+    low, high = marks.span([y for points in series for _, y in points], LEAST_SPAN_DEG)
+    now = seen.samples[-1][0]
+    inner = height - 2
+    cells = marks.chart(series, (seen.samples[0][0], now, low, high), width - LABEL, inner)
+    title = Text.assemble((f"{AXES[axis]} {which}, deg", TONES[axis]))
+    if len(series) == 2:
+        title.append(f"   {seen.plan.follows} dim", DIM)
+    rows = [title]
+    labels = {0: high, inner - 1: low}
+    for place, cell_row in enumerate(cells):
+        label = f"{labels[place]:.4g}" if place in labels else ""
+        rows.append(_cells(Text(f"{label:>{LABEL - 1}} ", DIM), cell_row, len(series), axis))
+    rows.append(Text(f"{'':{LABEL}}{'0 s':<{width - LABEL - 10}}{f'{now:.4g} s':>10}", DIM))
+    for line in rows:
+        line.truncate(width, pad=True)
+    return rows
+
+
+def _cells(line: Text, cells: Sequence[int], count: int, axis: int) -> Text:
+    """One line of a chart: the last series in the colour of its axis, those under it dim."""
+    for cell in cells:
+        tone = TONES[axis] if cell >> 8 == count - 1 else DIM
+        line.append(chr(marks.BRAILLE + (cell & 0xFF)) if cell else " ", tone)
+    return line
+
+
+def _curve(seen: Seen, which: str, axis: int) -> Points:
+    points: Points = []
+    for sample in seen.samples:
+        t_s, attitude, reference = sample
+        if which == "attitude":
+            points.append((t_s, attitude[axis]))
+        elif reference is not None:
+            error = error_deg(sample)
+            points.append((t_s, reference[axis] if which == "reference" or error is None else error[axis]))
+    return points

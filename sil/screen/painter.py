@@ -1,0 +1,148 @@
+"""The process that draws: `python -m sil.screen.painter`, datagrams on standard input, the view on standard error.
+
+A process of its own, because drawing takes milliseconds and a terminal may stop taking characters (Ctrl-S, slow line):
+neither may reach the laboratory's loop. It ends when the laboratory says so or is gone, however that came about, and
+leaves the cursor as it found it.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import socket
+import sys
+import time
+from typing import IO, Any
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.live import Live
+from rich.text import Text
+
+from sil.screen import messages, view
+from sil.screen.messages import End, Line, Message, Plan, State
+from sil.screen.seen import Seen
+
+DRAW_EVERY_S = 0.1
+LOOK_EVERY_S = 0.5  # at the size of the window, when nothing comes
+BIGGEST = 1 << 20  # bytes of a datagram
+READY = b"ready"
+BEGIN_FRAME, END_FRAME = "\x1b[?2026h", "\x1b[?2026l"  # synchronized output; terminals that do not know it ignore it
+
+
+def main() -> None:
+    """Draw until the run is over."""
+    stay_out_of_the_way()
+    orders = socket.socket(fileno=0)
+    try:
+        orders.send(READY)
+        Painter(orders, Console(file=_WholeFrames(sys.stderr), force_terminal=True)).work()  # type: ignore[arg-type]
+    except OSError:
+        return  # the terminal is gone, and nobody is left to tell
+
+
+def stay_out_of_the_way() -> None:
+    """Ordinary priority, any CPU, nice: whatever the laboratory was granted is not for drawing. Ctrl-C is its too."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+        os.sched_setaffinity(0, range(os.cpu_count() or 1))
+        os.nice(10)
+    except OSError:
+        return
+
+
+class Painter:
+    """Takes what comes, draws the newest at most ten times a second."""
+
+    def __init__(self, orders: socket.socket, console: Console) -> None:
+        self._orders, self._console = orders, console
+        self._seen: Seen | None = None
+        self._size = os.terminal_size((0, 0))
+        self._live: Live | None = None
+        self._over = False
+
+    def work(self) -> None:
+        """Until End, or until nobody is on the other end."""
+        try:
+            while not self._over:
+                began = time.monotonic()
+                if select.select([self._orders], [], [], LOOK_EVERY_S)[0]:
+                    self._take_all()
+                self._draw()
+                time.sleep(0.0 if self._over else max(0.0, began + DRAW_EVERY_S - time.monotonic()))
+        finally:
+            if self._live is not None:
+                self._live.stop()
+
+    def _take_all(self) -> None:
+        """Everything that has come by now: after a stopped terminal, only the newest is worth drawing."""
+        while not self._over:
+            try:
+                data = self._orders.recv(BIGGEST, socket.MSG_DONTWAIT)
+            except BlockingIOError:
+                return
+            except ConnectionError:
+                data = b""
+            self._take(messages.unpack(data) if data else End())
+
+    def _take(self, message: Message) -> None:
+        if isinstance(message, Plan):
+            self._seen = Seen(message)
+        elif isinstance(message, State) and self._seen is not None:
+            self._seen.take(message)
+        elif isinstance(message, Line):
+            self._console.print(Text(message.text), soft_wrap=True)
+        elif isinstance(message, End):
+            self._over = True
+
+    def _draw(self) -> None:
+        if self._seen is None or self._seen.state is None:
+            return
+        self._seen.ended = self._over
+        size = os.get_terminal_size(sys.stderr.fileno())
+        if size != self._size:
+            self._begin_anew(size)
+        assert self._live is not None
+        self._live.refresh()
+
+    def _begin_anew(self, size: os.terminal_size) -> None:
+        """The window has another size: the terminal wrapped the old lines anew, nobody knows where they are now."""
+        if self._live is not None:
+            self._live.stop()
+            self._console.clear()
+        self._size = size
+        self._console.size = size  # type: ignore[assignment]
+        assert self._seen is not None
+        self._live = Live(_Frame(self._seen), console=self._console, auto_refresh=False, vertical_overflow="crop")
+        self._live.start()
+
+
+class _Frame:
+    """The view as rich renders it: anew each time, for the size of the window."""
+
+    def __init__(self, seen: Seen) -> None:
+        self._seen = seen
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        yield Text("\n", end="", no_wrap=True, overflow="crop").join(
+            view.lines(self._seen, options.max_width, console.height - 1)
+        )
+
+
+class _WholeFrames:
+    """A text file whose every write is shown at once: no half-drawn view in between."""
+
+    def __init__(self, file: IO[str]) -> None:
+        self._file = file
+
+    def write(self, text: str) -> int:
+        return self._file.write(f"{BEGIN_FRAME}{text}{END_FRAME}")
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
+
+
+if __name__ == "__main__":
+    main()
