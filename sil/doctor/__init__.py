@@ -30,6 +30,7 @@ CHECKS = {
     "locked memory": "sil.doctor.machine:locked_memory",
     "pty": "sil.doctor.cables:pty",
     "udp": "sil.doctor.cables:udp",
+    "serial ports": "sil.doctor.device:ports",
     "c compiler": "sil.doctor.tools:c_compiler",
     "arm compiler": "sil.doctor.tools:arm_compiler",
     "emulator": "sil.doctor.tools:emulator",

@@ -20,6 +20,7 @@ USUAL_PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*")
 # Programs that open every new serial port to see what it is, and what keeps them from it.
 CURIOUS = {"ModemManager": "sudo systemctl disable --now ModemManager", "brltty": "sudo apt remove brltty"}
 SHOWN_PORTS = 6
+SHOWN_COMMAND = 70  # characters
 
 Status = Callable[[Path], os.stat_result]
 Access = Callable[[str, int], bool]
@@ -39,10 +40,11 @@ class Device:
 
 
 class Opener(NamedTuple):
-    """A process that has the device open."""
+    """A process that has the device open: its name, and the command it was started with."""
 
     pid: int
     name: str
+    command: str
 
 
 def find(around: Surroundings, path: str, status: Status = os.stat) -> Device | None:
@@ -78,6 +80,23 @@ def ports_here(around: Surroundings) -> tuple[str, ...]:
     folder = around.at("/dev")
     paths = [path for pattern in USUAL_PORTS for path in sorted(folder.glob(pattern))]
     return tuple(f"/dev/{path.relative_to(folder)}" for path in paths[:SHOWN_PORTS])
+
+
+def ports(around: Surroundings) -> Finding:
+    """The serial ports that a board may be on, and whether we may use them."""
+    return judge_ports(around, user_name(), os.access)
+
+
+def judge_ports(around: Surroundings, user: str, access: Access) -> Finding:
+    here = ports_here(around)
+    if not here:
+        return Finding(OK, "none of ttyUSB, ttyACM, ttyAMA", data={"ports": []})
+    closed = [port for port in here if not access(str(around.at(port)), os.R_OK | os.W_OK)]
+    data = {"ports": list(here), "not_permitted": closed}
+    if closed:
+        found = f"{', '.join(here)}; {user} may not use {', '.join(closed)}"
+        return Finding(NOTE, found, "what to do about it:", (f"sil doctor --link {closed[0]}",), data=data)
+    return Finding(OK, ", ".join(here), data=data)
 
 
 def _kind(mode: int) -> str:
@@ -124,10 +143,12 @@ def openers(around: Surroundings, device: Device, me: int) -> Finding:
     others, unseen = who_has(around, device.real, me)
     data = {"openers": [other._asdict() for other in others], "unseen_processes": unseen}
     if others:
-        named = ", ".join(f"{other.name} (pid {other.pid})" for other in others)
+        named = ", ".join(f"{other.command or other.name} (pid {other.pid})" for other in others)
         cures = tuple(dict.fromkeys(CURIOUS[other.name] for other in others if other.name in CURIOUS))
         ends = tuple(f"kill {other.pid}" for other in others if other.name not in CURIOUS)
         advice = "not talking to the board: two readers would share its bytes, and HELLO would end the other's session"
+        if any("firmware_sim" in other.command for other in others):
+            advice, ends = "that is a board on this very end of the cable: the doctor needs the other end", ()
         return Finding(PROBLEM, f"open in {named}", advice, (*cures, *ends), data=data)
     if unseen:
         found = f"nobody of ours; {unseen} processes of other users do not let us look"
@@ -150,8 +171,13 @@ def who_has(around: Surroundings, real: str, me: int) -> tuple[list[Opener], int
             continue
         if any(_target(handle) == real for handle in handles):
             name = around.text(f"/proc/{process.name}/comm") or "?"
-            found.append(Opener(int(process.name), name))
+            command = around.text(f"/proc/{process.name}/cmdline").replace("\0", " ").strip()
+            found.append(Opener(int(process.name), name, _shortened(command)))
     return found, unseen
+
+
+def _shortened(command: str) -> str:
+    return command if len(command) <= SHOWN_COMMAND else f"{command[: SHOWN_COMMAND - 3]}..."
 
 
 def _target(handle: Path) -> str:

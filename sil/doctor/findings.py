@@ -17,8 +17,8 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 class Finding(NamedTuple):
     """One line of the doctor. `check` is filled in by whoever calls the check.
 
-    found: what is so. advice: what to do about it; commands: what to type. lines: shown as they are (raw bytes, a
-    histogram). data: the numbers, for programs.
+    found: what is so. advice: what to do about it; commands: what to type. lines: more of what was found; raw:
+    bytes, never folded. data: the numbers, for programs.
     """
 
     status: str
@@ -28,10 +28,11 @@ class Finding(NamedTuple):
     lines: tuple[str, ...] = ()
     data: Mapping[str, Any] = NOTHING
     check: str = ""
+    raw: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        order = ("check", "status", "found", "advice", "commands", "lines", "data")
+        order = ("check", "status", "found", "advice", "commands", "lines", "raw", "data")
         mine = {**self._asdict(), "data": dict(self.data)}
         return {name: mine[name] for name in order}
 

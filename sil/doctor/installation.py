@@ -238,15 +238,15 @@ def judge_cache(directories: Mapping[str, Path]) -> Finding:
         "compiled": kernels,
         "bytes": size,
     }
-    what = ", ".join(f"{name} {count} function{'s' * (count != 1)}" for name, count in kernels.items())
-    found = f"{root}: {what}, {size_text(size)}"
+    what = ", ".join(f"{name} {count}" for name, count in kernels.items())
+    found = f"{root}: functions of {what}, {size_text(size)}"
     passing = [path for path in directories.values() if not path.is_dir() or _is_passing(path)]
     if passing:
         advice = "give it a directory of yours that may be written to; until then every start compiles again"
         return Finding(NOTE, f"no lasting cache: {passing[0]}", advice, ("export XDG_CACHE_HOME=~/.cache",), (), data)
     old = [path for path in root.glob("*-*") if path.is_dir() and path not in directories.values()]
     if len(old) > KEEP_OLD:
-        spent = f"; and {len(old)} of former sources, {size_text(sum(map(_size, old)))}"
+        spent = f"; {len(old)} directories of older sources, {size_text(sum(map(_size, old)))}"
         advice = "delete it all when you like: the next run compiles again"
         return Finding(NOTE, found + spent, advice, (f"rm -r {root}",), (), {**data, "old": len(old)})
     if not all(kernels.values()):

@@ -66,7 +66,8 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
     except LinkError as error:
         if str(error).startswith("link:"):
             raise
-        yield Finding(PROBLEM, str(error), "see above for who may and who does", check="open")
+        commands = (f"sudo fuser -v {urlsplit(url).path}",) if device is not None else ()
+        yield Finding(PROBLEM, str(error), "who has it open, of all users:", commands, check="open")
         return
     baud = link.baud if isinstance(link, SerialLink) and device is not None and not device.is_pty else None
     answered = False

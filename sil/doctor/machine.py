@@ -100,7 +100,7 @@ def _built_with(around: Surroundings, version: str) -> str:
         return ""
     models = {"NONE": "none", "VOLUNTARY": "voluntary", "LAZY": "lazy", "": "full"}
     known = re.findall(r"^CONFIG_PREEMPT_?(NONE|VOLUNTARY|LAZY|)=y$", text, re.MULTILINE)
-    return f"{models[known[0]]} (as built; chosen at boot)" if known else ""
+    return f"{models[known[0]]} (as built)" if known else ""
 
 
 def timers(around: Surroundings) -> Finding:
@@ -109,7 +109,7 @@ def timers(around: Surroundings) -> Finding:
     others = around.text("/sys/devices/system/clocksource/clocksource0/available_clocksource").split()
     slack = around.number("/proc/self/timerslack_ns")
     data = {"clocksource": source, "available": others, "timerslack_ns": slack}
-    said = f", timer slack {slack / 1000:g} us (a real-time run sets 1 ns)" if slack is not None else ""
+    said = f", timer slack {slack / 1000:g} us (realtime: 1 ns)" if slack is not None else ""
     found = f"clock source {source or 'not ours to see'}{said}"
     if source and source not in GOOD_CLOCKS:
         better = next((name for name in GOOD_CLOCKS if name in others), "")
@@ -167,7 +167,7 @@ def judge_real_time(around: Surroundings, limit: int, tries: Tries) -> Finding:
     data = {"granted": refusal is None, "rtprio": named, "capability": _capable(around, CAP_SYS_NICE)}
     if refusal is None:
         why = "CAP_SYS_NICE" if _capable(around, CAP_SYS_NICE) else f"RLIMIT_RTPRIO {named}"
-        return Finding(OK, f"SCHED_FIFO granted ({why}): --set clock.priority={TRIED_PRIORITY} works", data=data)
+        return Finding(OK, f"SCHED_FIFO granted ({why})", data=data)
     found = f"SCHED_FIFO refused ({refusal.strerror}; RLIMIT_RTPRIO {named}): clock.priority has no effect"
     advice, commands = _permit(around, "rtprio 99", "--cap-add=SYS_NICE --ulimit rtprio=99")
     return Finding(NOTE, found, advice, commands, data=data)

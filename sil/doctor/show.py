@@ -11,8 +11,10 @@ from typing import Any
 from sil.doctor.findings import NOTE, OK, PROBLEM, Finding
 
 COLOURS = {OK: "green", NOTE: "yellow", PROBLEM: "bold red"}
-STATUS_COLUMN, NAME_COLUMN = 9, 15
-WIDEST = 120  # longer lines are hard to read
+STATUS_COLUMN, NAME_COLUMN = 9, 14
+STEP = 3  # by which the second piece of a folded line is indented
+WIDE, NARROW_INDENT = 98, " " * 4
+WIDEST = 160  # longer lines are hard to read
 QUIET_S = 2.0  # nothing is said of what takes less
 PLAIN_EVERY_S = 5.0
 
@@ -24,26 +26,29 @@ class Page:
         from rich.console import Console
 
         self._console = Console(highlight=False, soft_wrap=True)
+        self._arrow = "→ " if "utf" in (self._console.encoding or "").lower() else "> "
         self._width = min(self._console.width, WIDEST) if self._console.is_terminal else 0
 
     def show(self, finding: Finding) -> None:
-        """One finding, with an empty line after one that has more than a line."""
+        """One finding: what was found, what to do, more of what was found, what to type."""
         from rich.text import Text
 
         colour = COLOURS[finding.status]
         indent = " " * (STATUS_COLUMN + NAME_COLUMN)
-        first, *more = self._folded(finding.found) or [""]
-        line = Text.assemble(
+        first, *more = self._folded(finding.found, 0) or [""]
+        head = Text.assemble(
             (f"{finding.status:<{STATUS_COLUMN}}", colour), (f"{finding.check:<{NAME_COLUMN}}", "bold")
         )
-        self._print(line.append(first))
+        self._print(head.append(first))
         for piece in more:
             self._print(Text(indent + piece))
-        if finding.advice:
-            for piece in self._folded(finding.advice):
-                self._print(Text(indent + piece, style="italic"))
-        for raw in finding.lines:
-            self._print(Text(indent + raw, style="dim"))
+        for number, piece in enumerate(self._folded(finding.advice, len(self._arrow))):
+            self._print(Text(f"{indent}{' ' * len(self._arrow) if number else self._arrow}{piece}"))
+        for line in finding.lines:
+            for number, piece in enumerate(self._folded(line, STEP)):
+                self._print(Text(f"{indent}{' ' * STEP if number else ''}{piece}", style="dim"))
+        for row in finding.raw:  # 73 columns wide
+            self._print(Text((NARROW_INDENT if 0 < self._width < WIDE else indent) + row, style="dim"))
         for command in finding.commands:
             self._print(Text.assemble(indent, ("$ ", "dim"), (command, "cyan")))
 
@@ -57,11 +62,11 @@ class Page:
         said = f", {notes} note{'s' * (notes != 1)}, {statuses.count(OK)} ok" if statuses else ""
         self._print(Text.assemble("\n", (f"{subject}: ", "bold"), word, said))
 
-    def _folded(self, text: str) -> list[str]:
-        """`text` in pieces that fit; whole where the output is no terminal."""
-        room = self._width - STATUS_COLUMN - NAME_COLUMN
+    def _folded(self, text: str, step: int) -> list[str]:
+        """`text` in pieces that fit, indented by `step` more; whole where the output is no terminal."""
+        room = self._width - STATUS_COLUMN - NAME_COLUMN - step
         if room < 20:
-            return [text]
+            return [text] if text else []
         return textwrap.wrap(text, room, break_long_words=False, break_on_hyphens=False)
 
     def _print(self, text: Any) -> None:

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
 from protocol import frames
 from protocol.frames import Hello
-from protocol.links.serial import LineErrors
+from protocol.links.serial import DEFAULT_BAUD, LineErrors
 from protocol.port import PortCounters
 from sil.doctor.findings import NOTE, OK, PROBLEM, Finding
-from sil.doctor.overheard import FEW_BYTES, guess, rows
+from sil.doctor.overheard import Guess, guess, rows
 from sil.doctor.talk import RoundTrips, Talk
 
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p99_9": 99.9, "max": 100.0}
 BINS = 32
+FEW_FRAMES = 3
+NO_COUNTERS = "this link has no framing, parity and overrun counters"
 SLOW_NS = 4_000_000  # more than the wire explains
 FAULTS = (
     "crc_errors",
@@ -57,7 +62,7 @@ def who(talk: Talk, board: Hello, unasked: Mapping[str, int]) -> Iterator[Findin
     if garbage:
         seen = guess(garbage)
         found = f"{talk.port.counters.discarded_bytes} bytes between the frames that were none: {seen.found}"
-        yield Finding(NOTE, found, seen.advice, lines=rows(garbage), data={"kind": seen.kind}, check="undecoded")
+        yield Finding(NOTE, found, seen.advice, raw=rows(garbage), data={"kind": seen.kind}, check="undecoded")
 
 
 # -- how fast ---------------------------------------------------------------------------------------------------------
@@ -82,10 +87,10 @@ def round_trips(talk: Talk, trips: RoundTrips, baud: int | None) -> Finding:
         "histogram": {"edges_us": [_rounded(edge) for edge in edges], "counts": counts},
     }
     scale, unit = (1000.0, "ms") if figures["p50"] >= 1000.0 else (1.0, "us")
-    shown = "  ".join(f"{name.replace('_', '.')} {_short(value / scale)}" for name, value in figures.items())
-    found = f"{len(trips.times_ns)} of {trips.asked} answered, {unit}: {shown}"
+    shown = ", ".join(f"{name.replace('_', '.')} {_short(value / scale)}" for name, value in figures.items())
+    found = f"{len(trips.times_ns)} of {trips.asked}: {shown} {unit}"
     lines = (
-        f"{_short(edges[0] / scale)} {bars(counts)} {_short(edges[-1] / scale)} {unit}  (logarithmic both ways)",
+        f"{_short(edges[0] / scale)} {bars(counts)} {_short(edges[-1] / scale)} {unit} (log)",
         *_share_of_the_wire(talk, baud, figures["p50"]),
     )
     if trips.lost:
@@ -101,12 +106,12 @@ def round_trips(talk: Talk, trips: RoundTrips, baud: int | None) -> Finding:
 
 
 def _share_of_the_wire(talk: Talk, baud: int | None, median_us: float) -> tuple[str, ...]:
-    what = "measured: HELLO and its echo; system call, driver, wire, the board's decoder, and back; not the law"
+    what = "HELLO and its echo: driver, wire, the board's decoder, and back; not the law"
     if baud is None:
-        return (what, "no wire time: this link has no baud rate")
+        return (f"{what}; no wire time, for this link has no baud rate",)
     wire_us = talk.wire_ns / 1000
     share = min(1.0, wire_us / median_us)
-    said = f"{talk.exchange_bytes} bytes at {baud} baud take {wire_us / 1000:.2f} ms, {share:.0%} of the median"
+    said = f"wire: {talk.exchange_bytes} bytes at {baud} baud are {wire_us / 1000:.2f} ms, {share:.0%} of the median"
     return what, f"{said}; the rest is {max(0.0, median_us - wire_us) / 1000:.2f} ms"
 
 
@@ -151,7 +156,7 @@ def errors(talk: Talk, at_greeting: PortCounters, before: LineErrors | None, aft
     counted = ", ".join(
         f"{name.replace('_', ' ')} {count}" for name, count in {**faults, **(line or {})}.items() if count
     )
-    no_line = "" if line is not None else "; this link has no framing, parity and overrun counters"
+    no_line = "" if line is not None else f"; {NO_COUNTERS}"
     if not counted:
         clean = "CRC, framing, parity, overrun" if line is not None else "CRC, lengths, sequence numbers"
         return Finding(OK, f"none ({clean}){no_line}", data=data, check="errors")
@@ -169,7 +174,7 @@ def line_lines(before: LineErrors | None, after: LineErrors | None) -> str:
     """`framing 12, parity 0, ...` since the port was opened, or that there is no such count."""
     line = _since(before, after)
     if line is None:
-        return "this link has no framing, parity and overrun counters"
+        return NO_COUNTERS
     return "the UART counted " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in line.items())
 
 
@@ -188,18 +193,30 @@ def no_answer(talk: Talk, url: str, line: str) -> Iterator[Finding]:
         advice = "a board whose receive line is broken, or somebody else's laboratory on the other side of a pty"
         yield Finding(PROBLEM, found, advice, data={"types": dict(talk.types)}, check="hello")
     elif talk.heard.count:
-        yield _garbage(talk, line)
+        yield _garbage(talk, url, line)
     else:
         yield _silence(talk, url, line)
 
 
-def _garbage(talk: Talk, line: str) -> Finding:
+def _garbage(talk: Talk, url: str, line: str) -> Finding:
     data = bytes(talk.heard.kept)
-    seen = guess(data)
-    question = " Wrong baud, or text?" if len(data) >= FEW_BYTES else ""
-    found = f"no HELLO came back, but {talk.heard.count} bytes that are no frame.{question} {seen.found.capitalize()}"
-    numbers = {"kind": seen.kind, "bytes": talk.heard.count, "first": data[:64].hex()}
-    return Finding(PROBLEM, found, f"{seen.advice}; {line}", lines=rows(data), data=numbers, check="hello")
+    counters = talk.port.counters
+    seen = DAMAGED if counters.crc_errors > counters.cobs_errors + counters.too_long + FEW_FRAMES else guess(data)
+    question = " Wrong baud, or text?" if seen.kind not in ("few", "frames") else ""
+    found = f"no HELLO came back, but {talk.heard.count} bytes that are no frame.{question} {_capital(seen.found)}"
+    numbers = {"kind": seen.kind, "bytes": talk.heard.count, "first": data[:64].hex(), "port": asdict(counters)}
+    commands = (f"{sys.executable} -m serial.tools.miniterm {' '.join(_port_of(url))}",) if seen.kind == "text" else ()
+    return Finding(PROBLEM, found, seen.advice, commands, (line,), numbers, "hello", rows(data))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _port_of(url: str) -> tuple[str, str]:
+    """(path, baud) for a terminal program."""
+    parts = urlsplit(url)
+    return parts.path, (parse_qs(parts.query).get("baud") or [str(DEFAULT_BAUD)])[0]
 
 
 def _silence(talk: Talk, url: str, line: str) -> Finding:
@@ -208,18 +225,28 @@ def _silence(talk: Talk, url: str, line: str) -> Finding:
     if refused:
         found = f"nobody listens on {url} (refused {refused} times)"
         return Finding(PROBLEM, found, "start the board", (f"sil board --link {url}",), check="hello")
-    causes = SILENT_UDP if talk.heard.datagram else SILENT_SERIAL
-    found = f"nothing came, neither unasked nor in answer to HELLO; {line}"
-    return Finding(PROBLEM, found, "likeliest first:", lines=causes, check="hello")
+    pty = url.startswith("serial:///dev/pts/")
+    causes = SILENT_UDP if talk.heard.datagram else SILENT_PTY if pty else SILENT_SERIAL
+    found = "nothing came, neither unasked nor in answer to HELLO"
+    return Finding(PROBLEM, found, "likeliest first:", lines=causes if pty else (*causes, line), check="hello")
 
 
+DAMAGED = Guess(
+    "frames",
+    "frames whose CRC is wrong: bits change on the way, or another program's protocol",
+    "check ground and cable length; a baud rate that is off by some percent does this, too",
+)
 SILENT_SERIAL = (
     "1. the board has power, and its program runs: press reset (at boot it says HELLO once)",
-    "2. this is the port it speaks on (sil doctor without a board plugged in, then with: which port is new?)",
+    "2. this is the port it speaks on (sil doctor lists them: which one is new when it is plugged in?)",
     "3. transmit to receive and receive to transmit, and a common ground",
     "4. the same baud rate at both ends: --try-bauds tries the usual ones",
     "5. levels: a 3.3 V board on an RS-232 port needs a converter",
-    "6. on a pty: a board has the other side open (python -m firmware_sim --link serial:///dev/pts/N)",
+    "6. the board waits for DTR or RTS, or is held in reset by them: both are inactive here",
+)
+SILENT_PTY = (
+    "1. somebody holds the other side of this pty, and that is a board, not a laboratory",
+    "2. of a pair of ptys, the board has one and the doctor the other: sil board --link serial:///dev/pts/N",
 )
 SILENT_UDP = (
     "1. the board runs and listens on this address and port, not on loopback only (udp://0.0.0.0:PORT)",
