@@ -47,12 +47,12 @@ class Goal:
         judged = [statistics.median(values)] if self.judged == "median" else values
         return all(value <= self.limit if self.at_most else value >= self.limit for value in judged)
 
-    def text(self, unit: str) -> str:
-        """`ratio <= 1.5`, `<= 5 us`, `<= beside + 1`."""
+    def text(self) -> str:
+        """`ratio <= 1.5`, `sil <= 5`, `sil <= beside + 1`."""
         sign = "<=" if self.at_most else ">="
         if self.of == "ratio":
             return f"ratio {sign} {self.limit:g}"
-        return f"{sign} {self.limit:g} {unit}" if self.of == "ours" else f"{sign} beside + {self.limit:g}"
+        return f"sil {sign} {self.limit:g}" if self.of == "ours" else f"sil {sign} beside + {self.limit:g}"
 
 
 @dataclass
@@ -98,7 +98,7 @@ class Line:
             "ours": _plain(self.ours),
             "beside": _plain(self.beside),
             "beside_what": self.beside_what,
-            "goal": self.goal.text(self.unit) if self.goal else None,
+            "goal": self.goal.text() if self.goal else None,
             "met": self.met,
         }
 

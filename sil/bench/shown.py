@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 from sil.bench.book import Book, Line, spread
@@ -112,36 +113,44 @@ def table_of(lines: Sequence[Line]) -> Any:
     unit = f", {next(iter(units))}" if len(units) == 1 else ""
     table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
     table.add_column("", overflow="fold")
-    for header in ("ratio", "low - high", f"sil{unit}", next(iter(names)) if len(names) == 1 else "beside"):
+    for header in ("ratio", "low", "high"):
+        table.add_column(header, justify="right", no_wrap=True)
+    for header in (f"sil{unit}", next(iter(names)) if len(names) == 1 else "beside"):
         table.add_column(header, justify="right", overflow="fold")
     table.add_column("goal", overflow="fold")
-    for line in lines:
-        if line.ours:
-            table.add_row(*cells(line, with_unit=len(units) > 1, with_name=len(names) > 1))
+    shown = [line for line in lines if line.ours]
+    for head, members in groupby(shown, key=lambda line: line.case.rpartition(", ")[0]):
+        group = list(members)
+        if heading := head if head and len(group) > 1 else "":
+            table.add_row(f"[dim]{heading}[/]")
+        for line in group:
+            case = f"  {line.case.removeprefix(f'{heading}, ')}" if heading else line.case
+            table.add_row(case, *cells(line, with_unit=len(units) > 1, with_name=len(names) > 1))
     return table
 
 
 def cells(line: Line, with_unit: bool, with_name: bool) -> list[str]:
-    """One row of the table, as rich markup."""
+    """One row of the table behind its name, as rich markup."""
     ratio, ours, beside = spread(line.ratios), spread(line.ours), spread(line.beside)
     unit = f" {line.unit}" if with_unit else ""
     name = f" ({line.beside_what})" if with_name and line.beside_what else ""
+    many = ratio is not None and len(line.ratios) > 1
     return [
-        line.case,
         f"[bold]{number(ratio.median)}[/]" if ratio else "-",
-        f"{number(ratio.low)} - {number(ratio.high)}" if ratio else "-",
+        number(ratio.low) if ratio and many else "",
+        number(ratio.high) if ratio and many else "",
         f"{number(ours.median)}{unit}" if ours else "-",
-        f"{number(beside.median)}{name}" if beside else "-",
+        f"{number(beside.median)}{name}" if beside else "",
         goal_text(line),
     ]
 
 
 def goal_text(line: Line) -> str:
-    """`met, ratio <= 1.5`."""
+    """`met ratio <= 1.5`."""
     if line.goal is None or line.met is None:
         return ""
     verdict = "[green]met[/]" if line.met else "[red]missed[/]"
-    return f"{verdict}, {line.goal.text(line.unit)}"
+    return f"{verdict} {line.goal.text()}"
 
 
 def goals_text(books: Sequence[Book]) -> str:

@@ -1,6 +1,8 @@
 """Bench `wakeup`: how late our ticks wake up, beside cyclictest at the same rate, policy, priority and CPU.
 
 ours    a whole `sil run` in real time over a pty with law pd: lateness of every tick after the first, from its log.
+asleep  the same with `clock.spin_us: 0`. By default a run does not sleep the last stretch before a deadline but looks
+        at the clock, so that it is on time although a wake-up is not; asleep it does exactly what cyclictest does.
 beside  cyclictest with as many wake-ups (sil.bench.wakers); it does nothing else, ours has a tick of work between two.
 
 Each repeat runs one after the other. 1000 Hz is T_s 0.01 s at ten times real time: the wall clock's period counts here,
@@ -20,6 +22,7 @@ from sil.bench.wakers import Waker, find_waker, percentiles
 
 PRIORITY = 50
 RATIO_P99 = 1.5
+JUDGED_FROM_HZ = 100  # below, a repeat has too few wake-ups for a p99
 START_S = 2.0  # of a `sil run` and its board
 NO_FIFO = "SCHED_FIFO is not permitted here (run as root, or set rtprio in /etc/security/limits.conf): left out"
 
@@ -39,8 +42,8 @@ class Pace(NamedTuple):
 
 
 PACES = (
-    Pace(2, 0.5, "realtime", 15.0, 3.0),
-    Pace(100, 0.01, "realtime", 15.0, 3.0),
+    Pace(2, 0.5, "realtime", 10.0, 3.0),
+    Pace(100, 0.01, "realtime", 12.0, 3.0),
     Pace(1000, 0.01, "scaled:10", 8.0, 2.0),
 )
 
@@ -51,7 +54,7 @@ class Wakeup:
     about = "wake-ups of a run in real time over a pty, beside cyclictest at the same rate, priority and CPU"
 
     def expected_s(self, plan: Plan) -> float:
-        each = sum(2 * pace.ticks(plan) / pace.rate_hz + START_S for pace in PACES)
+        each = sum(3 * pace.ticks(plan) / pace.rate_hz + 2 * START_S for pace in PACES)
         return plan.repeats * len(priorities()) * each
 
     def measure(self, plan: Plan, book: Book) -> None:
@@ -64,7 +67,7 @@ class Wakeup:
                     for pace in PACES:
                         what = f"{pace.rate_hz} Hz, {policy(priority)}, repeat {repeat + 1} of {plan.repeats}"
                         folder = Path(name) / f"{pace.rate_hz}-{priority}-{repeat}"
-                        one_pair(plan, book, waker, pace, priority, what, folder)
+                        one_round(plan, book, waker, pace, priority, what, folder)
 
 
 def priorities() -> tuple[int, ...]:
@@ -77,18 +80,24 @@ def policy(priority: int) -> str:
     return f"FIFO {priority}" if priority else "ordinary"
 
 
-def one_pair(plan: Plan, book: Book, waker: Waker, pace: Pace, priority: int, what: str, folder: Path) -> None:
-    """A run, then as many wake-ups of the bare program."""
+def one_round(plan: Plan, book: Book, waker: Waker, pace: Pace, priority: int, what: str, folder: Path) -> None:
+    """A run as it is, one that sleeps to its deadlines, then as many wake-ups of the bare program."""
     ticks, (lab, board) = pace.ticks(plan), cpus()
-    plan.doing(f"wakeup: sil run, {what}")
+    file = scenario_file(folder, pace.period_s, ticks)
     keys = clock_keys(pace.clock, priority, lab, board)
-    wall_s = ticks / pace.rate_hz
-    run = flights.paced(scenario_file(folder, pace.period_s, ticks), folder / "run", keys, wall_s)
-    for refused in run.summary["timing"].get("refused", ()):
-        book.note(f"refused: {refused}")
+    found: dict[str, list[float]] = {}
+    for name, more in (("sil", []), ("asleep", ["clock.spin_us=0"])):
+        plan.doing(f"wakeup: sil run{' asleep' if more else ''}, {what}")
+        run = flights.paced(file, folder / name, [*keys, *more], ticks / pace.rate_hz)
+        found[name] = run.lateness_us[1:]
+        for refused in run.summary["timing"].get("refused", ()):
+            book.note(f"refused: {refused}")
     plan.doing(f"wakeup: {waker.name}, {what}")
     beside = waker.lateness_us(1_000_000 // pace.rate_hz, ticks, priority, lab)
-    enter(book, f"{pace.rate_hz} Hz, {policy(priority)}", waker.name, run.lateness_us[1:], beside)
+    case = f"{pace.rate_hz} Hz {policy(priority)}"
+    enter(book, case, waker.name, found["sil"], beside, judged=pace.rate_hz >= JUDGED_FROM_HZ)
+    enter(book, f"{case} asleep", waker.name, found["asleep"], beside, judged=False)
+    pool(book, f"{case}, {waker.name}", beside)
 
 
 def clock_keys(clock: str, priority: int, lab: int, board: int) -> list[str]:
@@ -97,22 +106,20 @@ def clock_keys(clock: str, priority: int, lab: int, board: int) -> list[str]:
     return [*keys, f"clock.priority={priority}"] if priority else keys
 
 
-def enter(book: Book, case: str, beside_name: str, ours_us: list[float], beside_us: list[float]) -> None:
-    """One repeat of one case: a line per percentile, and all wake-ups into the details, where repeats are pooled."""
+def enter(book: Book, case: str, beside_name: str, ours_us: list[float], beside_us: list[float], judged: bool) -> None:
+    """One repeat of one case, a line per percentile."""
     mine, other = percentiles(ours_us), percentiles(beside_us)
     for name in mine:
-        judged = name == "p99" and not case.startswith("2 Hz")
-        goal = Goal(RATIO_P99) if judged else None
+        goal = Goal(RATIO_P99) if judged and name == "p99" else None
         book.line(f"{case}, {name}", "us", beside_name, goal).add(mine[name], other[name])
-    pool(book, case, "ours", ours_us)
-    pool(book, case, beside_name, beside_us)
+    pool(book, f"{case}, sil", ours_us)
 
 
-def pool(book: Book, case: str, whose: str, late_us: list[float]) -> None:
+def pool(book: Book, whose: str, late_us: list[float]) -> None:
     """Percentiles over all repeats together: the only ones that mean something far out, or at 2 Hz."""
-    everything = book.scratch.setdefault((case, whose), [])
+    everything = book.scratch.setdefault(whose, [])
     everything += late_us
-    pooled = book.details.setdefault("all repeats together, us", {}).setdefault(case, {})
+    pooled = book.details.setdefault("all repeats together, us", {})
     pooled[whose] = {"wakeups": len(everything), **percentiles(everything)}
 
 

@@ -24,9 +24,9 @@ def bench(
 ) -> int:
     """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
 
-    lockstep: against a bare ping-pong on a pty. wakeup, fast: against cyclictest (Debian package rt-tests), else a small
-    C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the least
-    that anybody would have to do.
+    lockstep: against a bare ping-pong on a pty. wakeup, fast: against cyclictest (Debian package rt-tests), else a
+    small C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the
+    least that anybody would have to do.
 
     All of it takes about 25 minutes; Ctrl-C prints what is finished. Close other programs first: the machine's load is
     in the table. The exit code says nothing about goals.
