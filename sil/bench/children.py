@@ -46,6 +46,7 @@ def run_child(
     The child gets 1 ns of timer slack, like our own processes, and SIGTERM when this process dies. When the wait ends
     by an exception (Ctrl-C), the child is ended first. Raises ChildFailed.
     """
+    _prctl(PR_SET_TIMERSLACK, 1)  # here: what a child has at its birth is what it falls back to after asking for FIFO
     try:
         child = subprocess.Popen(
             command,
@@ -79,10 +80,12 @@ def sil_command(*arguments: str) -> list[str]:
 
 def _settle() -> None:
     """In the child, before it becomes the program."""
+    _prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def _prctl(what: int, value: int) -> None:
     with contextlib.suppress(OSError, AttributeError):
-        libc = ctypes.CDLL(None)
-        libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM, 0, 0, 0)
-        libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
+        ctypes.CDLL(None).prctl(what, int(value), 0, 0, 0)
 
 
 def _end(child: subprocess.Popen[str]) -> None:
