@@ -24,15 +24,42 @@ def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
 
 
 def plot(
-    run_dir: RunArgument,
-    out: Annotated[Path | None, typer.Option("--out", help="PNG or PDF file. Default: RUN/plot.png.")] = None,
+    run_dirs: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Run directories or .mcap files; several are overlaid.")
+    ],
+    signals: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--signals",
+            metavar="A,B",
+            help="attitude, error, torque, momentum, rate, identification, lateness, answer, or any TELEMETRY triple "
+            "of the law, such as g or trace; repeatable. Default: the usual four, and one of the identification.",
+        ),
+    ] = None,
+    residuals: Annotated[
+        bool, typer.Option("--residuals", help="Several runs: also the difference of each to the first.")
+    ] = False,
+    dark: Annotated[bool, typer.Option("--dark", help="For dark pages and slides.")] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            help="PNG (overview), PDF (all pages) or a directory (every page as a PNG). Default: RUN/plot.png; "
+            "of several runs plot-A-B.png here.",
+        ),
+    ] = None,
 ) -> int:
-    """Draw a run: attitude against reference, error, torque, momentum, identification."""
+    """Draw a run, or several over each other: attitude against reference, error, torque, momentum, identification.
+
+    Examples: sil plot runs/mrac-rs232-001 | sil plot A B --signals error,torque --residuals --out a-b.png
+    """
+    from sil.report.plot import default_out
     from sil.report.plot import plot as draw
 
-    shown = opened(run_dir)
-    target = out or shown.directory / "plot.png"
-    draw(shown, target)
+    runs = [opened(path) for path in run_dirs]
+    names = [name.strip() for each in signals or () for name in each.split(",") if name.strip()]
+    target = out or default_out(runs)
+    draw(runs, target, names, residuals, dark)
     print(target)
     return EXIT_OK
 
