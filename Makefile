@@ -36,8 +36,7 @@ golden: $(VENV)/.installed
 	$(BIN)/python -m tools.spec_tables --write
 
 bench: $(VENV)/.installed
-	$(BIN)/python -m tools.bench.lockstep
-	$(BIN)/python -m tools.bench.law_step
+	$(BIN)/sil bench
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info tests/e2e/node_modules
