@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from typing import Annotated
 
 import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
 from sil.verbs import bench, doctor, replay, report, run, scenario, sweep
+from sil.verbs.manual import page_of
 
 app = typer.Typer(
     name="sil",
@@ -28,15 +30,39 @@ app = typer.Typer(
     "3 link or board failure or degraded timing, 130 interrupted.",
 )
 
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+        from platform import python_version
+
+        from protocol import frames
+
+        print(
+            f"sil {version('attitude-sil')}, layout of the frames {frames.LAYOUT_HASH:08x}, Python {python_version()}"
+        )
+        raise typer.Exit
+
+
+@app.callback()
+def sil(
+    version: Annotated[
+        bool, typer.Option("--version", help="Show versions and exit.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Options of `sil` itself."""
+
+
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, report.export, report.diff),
     "Study": (sweep.sweep, bench.bench),
-    "Prepare": (scenario.scenarios, scenario.check, doctor.doctor),
+    "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor),
 }
 for _panel, _verbs in VERBS.items():
     for _verb in _verbs:
-        app.command(rich_help_panel=_panel)(_verb)
+        _page = page_of(_verb)
+        app.command(rich_help_panel=_panel, help=_page.help, epilog=_page.epilog)(_verb)
 
 
 def main(argv: list[str] | None = None) -> None:

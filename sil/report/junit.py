@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from sil.scenario import Scenario
 
 THE_RUN = "the run itself"
-NOT_ENDED = "the run has not ended: it still goes on, or it was killed"
+THE_REPLAY = "replay is identical"
+NOT_ENDED = "it has not ended: it still goes on, or was killed"
 VERSIONS_OF = ("attitude-sil", "numpy", "numba")
 # All that XML 1.0 cannot carry, escaped or not: control characters, surrogates (from file names), U+FFFE and U+FFFF.
 UNPRINTABLE = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -60,9 +61,9 @@ def of_run(scenario: Scenario, summary: Mapping[str, Any]) -> str:
     return _text(scenario.name, facts, cases)
 
 
-def of_no_run(name: str, scenario: Scenario | None, message: str, kind: str = "not run") -> str:
+def of_no_run(name: str, scenario: Scenario | None, message: str, kind: str, about: str = THE_RUN) -> str:
     """The XML of a run that did not start, or did not end; scenario: None if not even that could be read."""
-    cases = [Case(THE_RUN, "error", kind, message)]
+    cases = [Case(about, "error", kind, message)]
     if scenario is not None:
         cases += _not_judged(scenario, "not judged: there is no run")
     return _text(name if scenario is None else scenario.name, _facts_of(scenario) if scenario else {}, cases)
@@ -70,7 +71,7 @@ def of_no_run(name: str, scenario: Scenario | None, message: str, kind: str = "n
 
 def of_replay(name: str, facts: Facts, difference: str) -> str:
     """The XML of a replay: one testcase, which failed if `difference` says where the answers are not the recorded."""
-    case = Case("replay is identical")
+    case = Case(THE_REPLAY)
     if difference:
         case = case._replace(outcome="failure", kind="difference", message=difference)
     return _text(name, facts, [case])
@@ -127,15 +128,16 @@ def _number(value: float | None) -> str:
 
 def _facts_of(scenario: Scenario) -> dict[str, str]:
     law = scenario.law
-    flies = {"law": f"{law.name} version {law.version}, {law.form}"} if scenario.board != "none" else {}
+    flies = {
+        "law": f"{law.name} version {law.version}, {law.form}",
+        "link": scenario.board if "://" in scenario.board else scenario.link.url,
+    }
     versions = {f"version.{name}": version(name) for name in VERSIONS_OF}
     return {
-        "scenario": scenario.name,
         "seed": str(scenario.seed),
-        **flies,
         "clock": scenario.clock.mode,
         "board": scenario.board,
-        "link": scenario.link.url,
+        **(flies if scenario.board != "none" else {}),
         **versions,
         "version.python": python_version(),
     }

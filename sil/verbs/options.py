@@ -8,37 +8,139 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from sil.trouble import UsageError
+from sil.verbs import completion
+
 if TYPE_CHECKING:
     from sil.runs import Run
     from sil.scenario import Scenario
 
+KEYS_PANEL = "Keys of the scenario"
+MACHINE_PANEL = "What the machine grants"
+RESULT_PANEL = "Results"
+
 ScenarioArgument = Annotated[
-    str, typer.Argument(metavar="SCENARIO", help="Built-in name (see `sil scenarios`) or YAML file.")
+    str,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="Built-in name (see `sil scenarios`) or YAML file.",
+        autocompletion=completion.scenarios,
+    ),
 ]
-RunArgument = Annotated[Path, typer.Argument(metavar="RUN", help="Run directory, or a run.mcap.")]
+RunArgument = Annotated[
+    Path, typer.Argument(metavar="RUN", help="Run directory, or a run.mcap.", autocompletion=completion.runs)
+]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Override one key, such as law.params.c2_pole=0.7; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override one key, such as law.params.c2_pole=0.7; repeatable. Keys and units: `sil schema`.",
+        rich_help_panel=KEYS_PANEL,
+        autocompletion=completion.sets,
+    ),
 ]
-ClockOption = Annotated[str | None, typer.Option("--clock", help="lockstep, realtime or scaled:N (N times real time).")]
+ClockOption = Annotated[
+    str | None,
+    typer.Option(
+        "--clock",
+        metavar="CLOCK",
+        help="lockstep, realtime or scaled:N (N times real time, 0.01 to 1000).",
+        rich_help_panel=KEYS_PANEL,
+        autocompletion=completion.clocks,
+    ),
+]
 LinkOption = Annotated[
     str | None,
-    typer.Option("--link", metavar="URL", help="pty, udp, inproc, udp://HOST:PORT or serial:///dev/X?baud=N."),
+    typer.Option(
+        "--link",
+        metavar="URL",
+        help="pty, udp, inproc, udp://HOST:PORT or serial:///dev/X?baud=N.",
+        rich_help_panel=KEYS_PANEL,
+        autocompletion=completion.links,
+    ),
+]
+PriorityOption = Annotated[
+    int | None,
+    typer.Option(
+        "--priority",
+        metavar="N",
+        min=1,
+        max=99,
+        help="SCHED_FIFO priority of laboratory and board; short for clock.priority.",
+        show_default=False,
+        rich_help_panel=MACHINE_PANEL,
+    ),
+]
+CpusOption = Annotated[
+    str | None,
+    typer.Option(
+        "--cpus",
+        metavar="LAB,BOARD",
+        help="CPU of the laboratory, CPU of the board, such as 0,1; short for clock.lab_cpu and clock.board_cpu.",
+        rich_help_panel=MACHINE_PANEL,
+    ),
 ]
 OutOption = Annotated[
-    Path | None, typer.Option("--out", help="Run directory; refused if not empty. Default: runs/NAME-NNN.")
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="DIR",
+        help="Run directory; refused if not empty. Default: runs/NAME-NNN.",
+        rich_help_panel=RESULT_PANEL,
+    ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="One JSON object on stdout, for programs.")]
+JunitOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--junit",
+        metavar="FILE",
+        help="JUnit XML for CI: a testcase per requirement and one for the run itself; written whatever happens.",
+        rich_help_panel=RESULT_PANEL,
+    ),
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="One JSON object on stdout, for programs.", rich_help_panel=RESULT_PANEL)
+]
+QuietOption = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Nothing but the verdict, in one line; errors.", rich_help_panel=RESULT_PANEL),
+]
+VerboseOption = Annotated[
+    bool,
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Also every event, the facts of link and session, a histogram of wake-ups.",
+        rich_help_panel=RESULT_PANEL,
+    ),
+]
 
-_KEYS = {"clock": "clock.mode", "link": "link.url", "board": "board"}
+_KEYS = {"clock": "clock.mode", "link": "link.url", "board": "board", "priority": "clock.priority"}
 
 
 def scenario_from(name: str, sets: list[str] | None, **options: str | None) -> Scenario:
-    """The scenario with its overrides; --clock, --link and --board are short for keys. Raises ScenarioInvalid."""
+    """The scenario with its overrides; --clock, --link, --board... are short for keys. Raises ScenarioInvalid."""
     from sil.scenario import load_scenario
 
     overrides = [f"{_KEYS[key]}={value}" for key, value in options.items() if value is not None]
     return load_scenario(name, [*(sets or ()), *overrides])
+
+
+def cpu_sets(cpus: str | None) -> list[str]:
+    """--cpus as overrides; either side may be left out: `0`, `0,1`, `,1`. Raises UsageError."""
+    parts = (cpus or "").split(",")
+    known = len(parts) <= 2 and any(parts) and all(part.isdecimal() or not part for part in parts)
+    if cpus is not None and not known:
+        raise UsageError(f"--cpus: expected LAB,BOARD, numbers of CPUs such as 0,1, got {cpus!r}")
+    return [f"{key}={part}" for key, part in zip(("clock.lab_cpu", "clock.board_cpu"), parts, strict=False) if part]
+
+
+def verbosity_of(quiet: bool, verbose: bool) -> int:
+    """-1, 0 or 1, as sil.screen takes it. Raises UsageError."""
+    if quiet and verbose:
+        raise UsageError("-q, -v: expected one of them, got both")
+    return int(verbose) - int(quiet)
 
 
 def opened(path: Path) -> Run:

@@ -1,0 +1,75 @@
+"""--junit FILE: from the first moment on it says something true, whatever becomes of the run.
+
+At the start it says that the run has not ended, so that neither an older green file nor nothing is left when the
+process is killed; at the end what was found, or why there is nothing to find.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+from sil.trouble import UsageError
+
+if TYPE_CHECKING:
+    from sil.scenario import Scenario
+
+
+class JunitFile:
+    """A context around one run; `scenario` is to be set as soon as it is known. file: None for no file at all.
+
+    out: the run directory if it was named: it has to be empty for the run, so no file is put into it before.
+    """
+
+    def __init__(self, file: Path | None, name: str, out: Path | None = None, about: str = "") -> None:
+        self.scenario: Scenario | None = None
+        self._file = file
+        self._name = Path(name).stem
+        self._out = out
+        self._about = about
+        self._over = False
+
+    def __enter__(self) -> Self:
+        from_outside = self._file is not None and not (
+            self._out is not None and self._file.resolve().is_relative_to(self._out.resolve())
+        )
+        if from_outside:
+            from sil.report.junit import NOT_ENDED
+
+            self._write_nothing_found(NOT_ENDED, "not ended")
+        return self
+
+    def finished(self, summary: Mapping[str, Any]) -> None:
+        """The run has come to its end; summary: as run_scenario returns it. Raises UsageError."""
+        if self._file is not None and self.scenario is not None:
+            from sil.report.junit import of_run
+
+            self.write(of_run(self.scenario, summary))
+
+    def write(self, text: str) -> None:
+        """The last word. Raises UsageError."""
+        if self._file is not None:
+            from sil.report.junit import write
+
+            self._over = True
+            write(self._file, text)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if error is None or self._over or self._file is None:
+            return
+        what = "interrupted" if isinstance(error, KeyboardInterrupt) else type(error).__name__
+        try:
+            self._write_nothing_found(str(error) or what, what)
+        except UsageError as second:
+            print(second, file=sys.stderr)  # the first error is on its way out
+
+    def _write_nothing_found(self, message: str, kind: str) -> None:
+        from sil.report.junit import THE_RUN, of_no_run, write
+
+        if self._file is not None:
+            write(self._file, of_no_run(self._name, self.scenario, message, kind, self._about or THE_RUN))

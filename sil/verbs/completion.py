@@ -1,0 +1,162 @@
+"""What the shell offers at TAB: scenarios, runs, keys of --set with their values, clocks, boards, links.
+
+A person waits for it, so nothing heavy is imported: keys come from the published JSON Schema, not from the model. Where
+a list is empty, the shell completes file names. Values that may follow KEY= come with the key, in one word.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import typer
+
+Offer = tuple[str, str]  # a word and what it means, which zsh and fish show
+MOST_FILES = 200
+DEVICES = ("/dev/serial/by-id/*", "/dev/ttyUSB*", "/dev/ttyACM*", "/dev/ttyAMA*")
+CLOCKS = (
+    ("lockstep", "as fast as both sides can"),
+    ("realtime", "one simulated second a second"),
+    ("scaled:20", "20 times real time"),
+)
+BOARDS = (
+    ("process", "the controller in a process of its own"),
+    ("inproc", "the controller in this process"),
+    ("none", "no controller"),
+)
+LINKS = (
+    ("pty", "pseudo-terminal, a serial line of this machine"),
+    ("udp", "UDP on this machine"),
+    ("inproc", "no cable, board in this process"),
+    ("udp://127.0.0.1:5005", "the board at this address"),
+)
+
+
+def scenarios(incomplete: str) -> list[Offer]:
+    """Built-in scenarios, and the YAML files here."""
+    from sil.scenarios import list_scenarios
+
+    files = [path.name for ending in ("*.yaml", "*.yml") for path in Path().glob(ending)]
+    here = [(name, "file") for name in sorted(files)[:MOST_FILES]]
+    return _fitting([*((info.name, info.about) for info in list_scenarios()), *here], incomplete)
+
+
+def runs(incomplete: str) -> list[Offer]:
+    """Run directories here and in runs/, newest first."""
+    found = [path.parent for pattern in ("runs/*/run.*", "*/run.*") for path in Path().glob(pattern)]
+    folders = sorted(dict.fromkeys(found), key=_changed, reverse=True)
+    return _fitting(((str(folder), _verdict(folder)) for folder in folders[:MOST_FILES]), incomplete)
+
+
+def clocks(incomplete: str) -> list[Offer]:
+    return _fitting(CLOCKS, incomplete)
+
+
+def boards(incomplete: str) -> list[Offer]:
+    return _fitting([*BOARDS, *_devices()], incomplete)
+
+
+def links(incomplete: str) -> list[Offer]:
+    return _fitting([*LINKS, *_devices()], incomplete)
+
+
+def sets(ctx: typer.Context, incomplete: str) -> list[Offer]:
+    """KEY= and KEY=VALUE of every key of a scenario, a section at a time: `law.`, then `law.form=fixed`."""
+    keys = {key: schema for key, schema in _keys(_laws(ctx)) if key.startswith(incomplete.partition("=")[0])}
+    sections = {key[: key.find(".", len(incomplete)) + 1] or key for key in keys}
+    if len(sections) > 1:  # such as law. and link. for `l`; a key that is complete has its = already
+        whole = [(f"{name}=" if name in keys else name, _about(keys.get(name, {}))) for name in sorted(sections)]
+        return _fitting(whole, incomplete)
+    return _fitting(
+        ((f"{key}={value}", _about(schema)) for key, schema in keys.items() for value in _values(schema)), incomplete
+    )
+
+
+# -- the schema ----------------------------------------------------------------------------------------------------
+
+
+def _keys(law_names: tuple[str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Dotted key and schema of everything that --set may set; parameters of these laws only, () for all."""
+    from sil.scenarios import SCHEMA
+
+    whole = json.loads(SCHEMA.read_text(encoding="utf-8"))
+    known = whole["$defs"]
+
+    def below(section: dict[str, Any], prefix: str) -> Iterator[tuple[str, dict[str, Any]]]:
+        for name, schema in section["properties"].items():
+            reference = next((part["$ref"] for part in (schema, *schema.get("anyOf", ())) if "$ref" in part), "")
+            if reference:
+                yield from below(known[reference.rpartition("/")[2]], f"{prefix}{name}.")
+            elif name != "extends" and f"{prefix}{name}" != "law.params":
+                yield f"{prefix}{name}", schema
+
+    yield from below(whole, "")
+    for name in sorted(known):
+        if name.startswith("Params_") and (not law_names or name.removeprefix("Params_") in law_names):
+            yield from below(known[name], "law.params.")
+
+
+def _laws(ctx: typer.Context) -> tuple[str, ...]:
+    """The law that this command line is about, () if that cannot be said."""
+    said = [text.partition("=")[2] for text in ctx.params.get("set_") or () if text.startswith("law.name=")]
+    if said:
+        return (said[-1],)
+    try:
+        from sil.scenario_source import read_scenario
+
+        return (str(read_scenario(str(ctx.params["scenario"]), ()).data["law"]["name"]),)
+    except (KeyError, TypeError, ValueError):  # no scenario yet, none of that name, or nothing said about its law
+        return ()
+
+
+def _values(schema: dict[str, Any]) -> list[str]:
+    """What may stand behind KEY=: nothing yet (so that the shell adds no space), the names there are, the default."""
+    names: list[Any] = []
+    for part in (schema, *schema.get("anyOf", ())):
+        names += part.get("enum", ())
+        names += [True, False] if part.get("type") == "boolean" else ()
+        names += [None] if part.get("type") == "null" or None in _types(part) else ()
+    default = [schema["default"]] if "default" in schema else []
+    return ["", *dict.fromkeys(map(_yaml, [*default, *names]))]
+
+
+def _types(schema: dict[str, Any]) -> list[Any]:
+    types = schema.get("type")
+    return [None if each == "null" else each for each in types] if isinstance(types, list) else []
+
+
+def _yaml(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
+
+
+def _about(schema: dict[str, Any]) -> str:
+    return str(schema.get("description", ""))
+
+
+# -- files ---------------------------------------------------------------------------------------------------------
+
+
+def _devices() -> list[Offer]:
+    found = sorted(path for pattern in DEVICES for path in Path("/").glob(pattern.removeprefix("/")))
+    return [(f"serial://{path}", "serial device") for path in found]
+
+
+def _changed(folder: Path) -> float:
+    try:
+        return folder.stat().st_mtime
+    except OSError:
+        return 0.0
+
+
+def _verdict(folder: Path) -> str:
+    """`passed`, from the summary of a run."""
+    try:
+        return str(json.loads((folder / "summary.json").read_text(encoding="utf-8"))["verdict"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return "no summary"
+
+
+def _fitting(offers: Iterable[Offer], incomplete: str) -> list[Offer]:
+    return [(word, about) for word, about in dict.fromkeys(offers) if word.startswith(incomplete)]
