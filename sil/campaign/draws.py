@@ -1,6 +1,6 @@
 """Fractions in [0, 1) for the drawn axes: independent ones, or a Latin hypercube. They depend on the seed alone.
 
-Each axis has its own counter-based generator, keyed by (seed, name of the axis): another axis more, or another number
+Each axis has its own generator, seeded by (seed, name of the axis): another axis more, or another number
 of draws, leaves the fractions of an axis as they were (random sampling).
 """
 
@@ -32,5 +32,5 @@ def latin_hypercube(seed: int, axes: int, draws: int) -> list[Row]:
 
 
 def _generator(seed: int, name: str) -> np.random.Generator:
-    key = np.array([seed, zlib.crc32(name.encode()) << 32 | zlib.crc32(b"sweep")], dtype=np.uint64)
-    return np.random.Generator(np.random.Philox(key=key))
+    # Philox as for the noise of a run, but from a seed sequence: the sampler of scipy wants to spawn from it.
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, zlib.crc32(name.encode())])))
