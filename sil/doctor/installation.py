@@ -247,7 +247,7 @@ def judge_cache(directories: Mapping[str, Path]) -> Finding:
     old = [path for path in root.glob("*-*") if path.is_dir() and path not in directories.values()]
     if len(old) > KEEP_OLD:
         spent = f"; {len(old)} directories of older sources, {size_text(sum(map(_size, old)))}"
-        advice = "delete it all when you like: the next run compiles again"
+        advice = "delete it all while no run is under way: the next one compiles again"
         return Finding(NOTE, found + spent, advice, (f"rm -r {root}",), (), {**data, "old": len(old)})
     if not all(kernels.values()):
         return Finding(OK, f"{found} (the first run compiles, which takes a minute)", data=data)
