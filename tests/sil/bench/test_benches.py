@@ -1,0 +1,93 @@
+"""The benches that need nothing but this package run, and a machine without Basilisk gets its figures all the same."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from sil.bench import loop, plant
+from sil.bench.book import Book, Plan
+from sil.bench.codec import bare, frames_of_a_tick, ours
+from sil.bench.series import run_series
+from sil.bench.tape import Tape
+from sil.cli import app
+from sil.sinks.nothing import Nothing
+
+
+@pytest.fixture
+def no_basilisk(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.partition(".")[0] == "Basilisk"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "Basilisk", None)
+
+
+@pytest.mark.usefixtures("no_basilisk")
+def test_without_basilisk_ours_is_measured_and_the_way_to_get_it_is_said() -> None:
+    book = Book("plant")
+    plant.measured(book, "free", plant.parameters(False), 10)
+    assert (len(book.lines[0].ours), book.lines[0].beside) == (1, [])
+    assert book.notes == ["Basilisk is not installed: pip install 'attitude-sil[bench]'"]
+
+
+@pytest.mark.usefixtures("no_basilisk")
+def test_without_basilisk_the_loop_has_no_ratio_to_reach() -> None:
+    book = Book("loop")
+    assert loop.basilisk_speed(book, 10) is None
+    assert len(book.notes) == 1
+
+
+def test_basilisk_moves_the_same_body_the_same_way() -> None:
+    """The comparison is fair only while both end at the same attitude."""
+    pytest.importorskip("Basilisk")
+    book = Book("plant")
+    for case, gravity_gradient in plant.CASES.items():
+        plant.measured(book, case, plant.parameters(gravity_gradient), 200)
+    assert all(line.beside for line in book.lines)
+    assert all(angle < 1e-9 for angle in book.details.values())
+    assert book.notes == []
+
+
+def test_basilisk_flies_its_python_law() -> None:
+    pytest.importorskip("Basilisk")
+    assert (loop.basilisk_speed(Book("loop"), 10) or 0.0) > 0.0
+
+
+def test_a_codec_bench_measures_the_frames_of_a_real_tick() -> None:
+    packets = frames_of_a_tick()
+    assert set(packets) == {"SAMPLE", "COMMAND", "TELEMETRY"}
+    for step in (ours, bare):
+        step(list(packets.values()))()
+
+
+def test_a_tape_plays_every_row_in_order() -> None:
+    """The recorder bench replays a run's rows: another order or number would be another load."""
+    tape, again = Tape(), Tape()
+    tape.packet(0, 1, 2, b"abc")
+    tape.event(0, 7, 1, 2)
+    tape.housekeeping(0, b"de")
+    tape.commit(0)
+    tape.play(again)
+    assert again.rows == tape.rows
+    assert again.packets == [b"abc"]
+    tape.play(Nothing())
+
+
+def test_recorder_and_law_have_their_lines_beside_something() -> None:
+    books, interrupted = run_series(["recorder", "law"], Plan(1, quick=True))
+    assert not interrupted
+    assert all(book.finished for book in books), [book.skipped for book in books]
+    cases = [[line.case for line in book.lines] for book in books]
+    assert cases[0] == ["rows into run.journal", "sealing to run.mcap"]
+    assert set(cases[1]) >= {"pd, float", "pd, fixed", "mrac, float", "mrac, fixed", "appc, float", "appc, fixed"}
+    assert all(len(line.ours) == len(line.beside) == 1 for book in books for line in book.lines)
+
+
+def test_the_verb_gives_one_json_object() -> None:
+    done = CliRunner().invoke(app, ["bench", "codec", "--quick", "--repeats", "1", "--json"])
+    found = json.loads(done.stdout)
+    assert set(found) == {"machine", "repeats", "quick", "interrupted", "benches"}
+    assert found["benches"]["codec"]["finished"] is True
+    assert found["benches"]["codec"]["lines"][0]["beside_what"] == "crc32 and COBS alone"
