@@ -24,18 +24,20 @@ def worth_drawing(seen: Seen) -> bool:
     return len(seen.samples) >= 2
 
 
-def peaks(seen: Seen, width: int) -> list[tuple[list[float | None], float]]:
-    """Per axis, the largest |error| (|attitude| without a reference) in each of `width` parts of the run so far."""
-    now = seen.samples[-1][0] if seen.samples else 0.0
-    count = min(width, max(len(seen.samples), 1))
-    result = []
-    for axis in range(3):
-        points = [(t, abs(y)) for t, y in _curve(seen, "error" if seen.plan.follows else "attitude", axis)]
-        values = marks.binned(points, 0.0, now, count)
-        top = max((y for _, y in points if math.isfinite(y)), default=0.0)
-        wide = [values[place * count // width] for place in range(width)]
-        result.append((wide, top))
-    return result
+def past(seen: Seen, axis: int, width: int) -> str:
+    """|error| of one axis (|attitude| without a reference) in `width` characters, the highest of which is its peak."""
+    first, now = (seen.samples[0][0], seen.samples[-1][0]) if seen.samples else (0.0, 0.0)
+    count = max(min(width, len(seen.samples)), 1)
+    points = [(t, abs(y)) for t, y in _curve(seen, "error" if seen.plan.follows else "attitude", axis)]
+    values = marks.binned(points, first, now, count)
+    top = max((y for _, y in points if math.isfinite(y)), default=0.0)
+    return marks.history([values[place * count // width] for place in range(width)], max(top, LEAST_SPAN_DEG))
+
+
+def since(seen: Seen) -> str:
+    """`so far`, or how far back the histories go."""
+    run_s = seen.samples[-1][0] if seen.samples else 0.0
+    return "so far" if run_s <= seen.plan.window_s else f"of the last {seen.plan.window_s:g} s"
 
 
 def row(seen: Seen, which: str, width: int, height: int) -> list[Text]:
@@ -56,9 +58,9 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
     curve = _curve(seen, which, axis)
     series = [_curve(seen, "reference", axis), curve] if which == "attitude" and seen.plan.follows else [curve]
     low, high = marks.span([y for points in series for _, y in points], LEAST_SPAN_DEG)
-    now = seen.samples[-1][0]
+    first, now = seen.samples[0][0], seen.samples[-1][0]
     inner = height - 2
-    cells = marks.chart(series, (seen.samples[0][0], now, low, high), width - LABEL, inner)
+    cells = marks.chart(series, (first, now, low, high), width - LABEL, inner)
     title = Text.assemble((f"{AXES[axis]} {which}, deg", TONES[axis]))
     if len(series) == 2:
         title.append(f"   {seen.plan.follows} dim", DIM)
@@ -66,8 +68,8 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
     labels = {0: high, inner - 1: low}
     for place, cell_row in enumerate(cells):
         label = f"{labels[place]:.4g}" if place in labels else ""
-        rows.append(_cells(Text(f"{label:>{LABEL - 1}} ", DIM), cell_row, len(series), axis))
-    rows.append(Text(f"{'':{LABEL}}{'0 s':<{width - LABEL - 10}}{f'{now:.4g} s':>10}", DIM))
+        rows.append(_cells(Text.assemble((f"{label:>{LABEL - 1}} ", DIM)), cell_row, len(series), axis))
+    rows.append(Text(f"{'':{LABEL}}{_seconds(first):<{width - LABEL - 12}}{_seconds(now):>12}", DIM))
     for line in rows:
         line.truncate(width, pad=True)
     return rows
@@ -79,6 +81,10 @@ def _cells(line: Text, cells: Sequence[int], count: int, axis: int) -> Text:
         tone = TONES[axis] if cell >> 8 == count - 1 else DIM
         line.append(chr(marks.BRAILLE + (cell & 0xFF)) if cell else " ", tone)
     return line
+
+
+def _seconds(t_s: float) -> str:
+    return f"{t_s:.4g} s" if t_s < 1000 else f"{t_s:,.0f} s"
 
 
 def _curve(seen: Seen, which: str, axis: int) -> Points:

@@ -18,6 +18,7 @@ class Plan(NamedTuple):
     scenario: str
     about: tuple[str, ...]  # law, clock, board and link, for the title
     duration_s: float
+    window_s: float  # how far back histories go
     period_s: float
     wall_period_ms: float | None  # None: lockstep
     torque_max_Nm: tuple[float | None, ...]

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from sil.rig import Rig
     from sil.scenario import Scenario
 
-SAMPLES = 1500  # of a run's history, whatever its length
+WINDOW_S = 600.0  # simulated: a manoeuvre; what lies further back is in the log
+SAMPLES = 1500  # of that window
+SAMPLES_A_LOOK = 50  # at most: a fast run's history is coarser, and costs no more
 REMEMBERED = 64  # ticks that TELEMETRY may lag behind
 MOST_NEW = 1000  # entries of one State, when the screen could not be told for a while
 DEG_PER_BAM = 360.0 / 2**32
@@ -45,6 +47,7 @@ def plan_of(scenario: Scenario, rig: Rig) -> Plan:
         scenario.name,
         (law, scenario.clock.mode, board),
         scenario.ticks * scenario.period_ns * 1e-9,
+        min(scenario.ticks * scenario.period_ns * 1e-9, WINDOW_S),
         scenario.period_ns * 1e-9,
         period_ms / rig.clock.scale if rig.clock.paced else None,
         wheels.torque_max_Nm,
@@ -59,7 +62,8 @@ class Reader:
     def __init__(self, scenario: Scenario, rig: Rig, follows: str) -> None:
         self._rig, self._follows = rig, follows
         self._period_s = scenario.period_ns * 1e-9
-        self._every = max(1, -(-scenario.ticks // SAMPLES))
+        self._every = self._least = max(1, round(min(scenario.ticks, WINDOW_S / self._period_s) / SAMPLES))
+        self._looked = 0  # tick of the last look
         self._patience = max(scenario.telemetry_every, 4)  # ticks to wait for TELEMETRY
         self._due = 0  # next tick of the history
         self._paired = -1  # newest tick whose attitude and reference are both known
@@ -69,14 +73,12 @@ class Reader:
         self._events: deque[EventRow] = deque(maxlen=MOST_NEW)
         self._late_seen = self._answers_seen = 0
         self._overruns = 0
-        self._began = time.monotonic()
-
-    def begin(self) -> None:
-        """The first tick is about to happen."""
-        self._began = time.monotonic()
+        self._began_s = 0.0  # when the first tick was over
 
     def take(self, tick: int, motion: Motion) -> None:
         """A tick is over; nothing is computed unless the history wants it."""
+        if not self._recent:
+            self._began_s = time.monotonic()
         self._recent.append(motion)
         if tick >= self._due:
             self._sample(tick, motion)
@@ -121,6 +123,8 @@ class Reader:
         """What is new; call `told()` when it has reached the screen, otherwise it is part of the next one too."""
         if self._follows:
             self._pair(tick)
+        self._every = max(self._least, (tick - self._looked) // SAMPLES_A_LOOK)
+        self._looked = tick
         loop, answers = self._rig.loop, self._rig.answers
         acting = loop.commands.acting
         h_x, h_y, h_z = motion.momentum_B.tolist()
@@ -128,7 +132,7 @@ class Reader:
         answer_ns = answers.answer_ns if answers is not None else []
         return State(
             tick * self._period_s,
-            time.monotonic() - self._began,
+            time.monotonic() - self._began_s,
             _degrees(motion),
             self._held_against,
             acting.torque_Nm,

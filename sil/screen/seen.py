@@ -7,11 +7,12 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from sil.screen.messages import EventRow, Plan, Sample, State
+from sil.screen.messages import EventRow, Plan, Sample, State, error_deg
 from sil.sinks.events import describe
 
 TIMES = 2000  # wake-ups and answers that percentiles are taken of
 EVENTS = 100
+SAMPLES = 4000
 NEAR = 4  # an event of a kind that is among the last few is counted there
 
 
@@ -66,7 +67,8 @@ class Seen:
 
     plan: Plan
     state: State | None = None
-    samples: list[Sample] = field(default_factory=list)  # bounded by the one who sends them
+    samples: deque[Sample] = field(default_factory=lambda: deque(maxlen=SAMPLES))  # of the plan's window
+    peaks: list[float] = field(default_factory=lambda: [0.0] * 3)  # of the run: |error|, or |attitude| without one
     happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=EVENTS))
     late: Times = field(default_factory=Times)
     answers: Times = field(default_factory=Times)
@@ -77,13 +79,22 @@ class Seen:
     def take(self, state: State) -> None:
         """The next state."""
         self.state = state
-        self.samples += state.samples
+        for sample in state.samples:
+            self._sample(sample)
         self.late.add(state.late_ns)
         self.answers.add(state.answer_ns)
         self.torque_seen_Nm = max(self.torque_seen_Nm, *_finite(state.torque_Nm))
         self.momentum_seen_Nms = max(self.momentum_seen_Nms, *_finite(state.momentum_Nms))
         for row in state.events:
             self._event(row)
+
+    def _sample(self, sample: Sample) -> None:
+        self.samples.append(sample)
+        while self.samples[0][0] < sample[0] - self.plan.window_s:
+            self.samples.popleft()
+        values = error_deg(sample) if self.plan.follows else sample[1]
+        if values is not None:
+            self.peaks = [max(peak, value) for peak, value in zip(self.peaks, _finite(values), strict=True)]
 
     def _event(self, row: EventRow) -> None:
         t_s, code, a, b, origin = row

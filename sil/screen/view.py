@@ -18,8 +18,9 @@ from sil.screen.seen import Seen, Times
 
 WIDE = 130  # columns from which two blocks stand side by side
 GAP = 4  # columns between them
-LEAST_EVENTS = 3  # lines that charts leave to events
-CHART_LEAST, CHART_MOST = 7, 16  # lines of a row of charts
+LEAST_EVENTS = 4  # events that charts leave room for
+CHART_LEAST, CHART_MOST = 5, 16  # lines of a row of charts
+CHART_NARROWEST = 60  # columns of the window
 BLANK = Text("")
 GRAVE = frozenset(("real_misses", "crc_errors", "overruns"))
 ALWAYS = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")
@@ -36,17 +37,20 @@ def lines(seen: Seen, width: int, height: int) -> list[Text]:
     while blocks and len(top) + sum(map(len, blocks)) > height:
         blocks.pop()
     rows = _spaced(top, blocks, height)
+    rows += _charts(seen, width, height - len(rows) - 2 - min(len(seen.happenings), LEAST_EVENTS))
     room = height - len(rows)
-    if charts.worth_drawing(seen):
-        count = 2 if room >= 2 * (CHART_LEAST + 3) + LEAST_EVENTS + 2 and seen.plan.follows else 1
-        each = min((room - LEAST_EVENTS - 2) // count - 1, CHART_MOST)
-        if each >= CHART_LEAST and width >= 60:
-            for which in ("attitude", "error")[:count]:
-                rows += [BLANK, *charts.row(seen, which, width, each)]
-    room = height - len(rows)
-    if room >= 3:
+    if room >= 2:
         rows += [BLANK, *events(seen, width, room - 1)]
     return [_cut(row, width) for row in rows[:height]]
+
+
+def _charts(seen: Seen, width: int, room: int) -> list[Text]:
+    """One row of charts or two, as high as `room` lines allow; none in a small window."""
+    count = 2 if room >= 2 * (CHART_LEAST + 1) and seen.plan.follows else 1
+    each = min(room // count - 1, CHART_MOST)
+    if each < CHART_LEAST or width < CHART_NARROWEST or not charts.worth_drawing(seen):
+        return []
+    return [line for which in ("attitude", "error")[:count] for line in (BLANK, *charts.row(seen, which, width, each))]
 
 
 def _blocks(seen: Seen, state: State, width: int) -> list[list[Text]]:
@@ -115,11 +119,10 @@ def attitude(seen: Seen, state: State, width: int) -> list[Text]:
     if follows:
         head = f"{'deg':6}{'attitude':>10}{follows:>11}{'error':>10}"
     room = width - len(head) - 2 - 10
-    title = f"|{'error' if follows else 'attitude'}| so far"
+    title = f"|{'error' if follows else 'attitude'}| {charts.since(seen)}"
     rows = [Text.assemble((head, DIM), (f"  {title:<{max(room, 0)}}" if room >= 12 else "", DIM))]
     if room >= 12:
         rows[0].append(f"{'peak':>10}", DIM)
-    past = charts.peaks(seen, room) if room >= 12 else []
     for axis, name in enumerate(AXES):
         row = Text.assemble((f"{name:6}", TONES[axis]), (f"{number(shown[axis], 3):>{10 if follows else 12}}", "bold"))
         if follows:
@@ -127,9 +130,7 @@ def attitude(seen: Seen, state: State, width: int) -> list[Text]:
             row.append(f"{number(wanted[axis] if wanted else None, 3):>11}")
             row.append(f"{number(error[axis] if error else None, 4):>10}", "bold")
         if room >= 12:
-            values, top = past[axis]
-            row.append(f"  {marks.history(values, top):<{room}}", TONES[axis])
-            row.append(f"{number(top, 3):>10}")
+            row.append(f"  {charts.past(seen, axis, room)}", TONES[axis]).append(f"{number(seen.peaks[axis], 3):>10}")
         rows.append(row)
     return rows
 
@@ -138,14 +139,12 @@ def wheels(seen: Seen, state: State, width: int) -> list[Text]:
     """Torque commanded and wheel momentum per axis, as bars against their limits."""
     half = (width - 6 - 2) // 2
     plan = seen.plan
-    held = "" if state.source == "fresh" else f" {state.source}"
+    held = "" if state.source == "fresh" else f" ({state.source})"
     torques = _bars(f"torque, mN m{held}", state.torque_Nm, plan.torque_max_Nm, seen.torque_seen_Nm, 1e3, half)
     momenta = _bars("momentum, mN m s", state.momentum_Nms, plan.momentum_max_Nms, seen.momentum_seen_Nms, 1e3, half)
     rows = [Text.assemble(f"{'':6}", torques[0], "  ", momenta[0])]
     for axis, name in enumerate(AXES):
         rows.append(Text.assemble((f"{name:6}", TONES[axis]), torques[axis + 1], "  ", momenta[axis + 1]))
-    if held:
-        rows[0].stylize(WARN, 6, 6 + len(f"torque, mN m{held}"))
     return rows
 
 
@@ -153,14 +152,15 @@ def _bars(
     title: str, values: Triple, limits: Sequence[float | None], most_seen: float, scale: float, width: int
 ) -> list[Text]:
     """A title and three bars about zero; the end of a bar is the limit, or without one the most that was seen."""
-    head = f"{title:<{max(width - 7, 0)}}{'limit':>7}"[:width]
-    rows = [Text(head, DIM)]
-    bar = width - 8 - 1 - 7
+    rows = [
+        Text.assemble((title, WARN if title.endswith(")") else DIM), (f"{'limit':>{max(width - len(title), 0)}}", DIM))
+    ]
+    bar = (width - 8 - 1 - 7 - 1) // 2 * 2 + 1
     for axis, (value, limit) in enumerate(zip(values, limits, strict=True)):
         end = limit if limit is not None else most_seen
         share = value / end if end > 0 else 0.0
         at_limit = limit is not None and abs(value) >= limit * (1 - 1e-9)
-        row = Text(f"{number(value * scale, 2):>8} ", "bold")
+        row = Text.assemble((f"{number(value * scale, 2):>8} ", "bold"))
         if bar >= 5:
             low, filled, high = marks.about_zero(share, bar)
             row.append(low, DIM).append(filled, BAD if at_limit else TONES[axis]).append(high, DIM)
@@ -177,7 +177,7 @@ def times(seen: Seen, width: int) -> list[Text]:
     if not kinds:
         return []
     rebased = seen.state.rebased if seen.state is not None else 0
-    head = Text(f"{'deadline, ms' if period_ms else 'board, ms':13}{'now':>8}{'p99':>9}{'worst':>9}", DIM)
+    head = Text.assemble((f"{'deadline, ms' if period_ms else 'board, ms':13}{'now':>8}{'p99':>9}{'worst':>9}", DIM))
     if period_ms:
         head.append(f"   {'of a period of ' + format(period_ms, '.4g') + ' ms':<{max(width - 39 - 3 - 10, 0)}}", DIM)
         head.append(f"{'margin':>10}", DIM)
@@ -207,13 +207,15 @@ def link(state: State, width: int) -> list[Text]:
     shown = [(name, count) for name, count in state.counters.items() if name in ALWAYS or count]
     if not shown:
         return []
-    rows = [Text("link   ", DIM)]
+    rows = [Text.assemble(("link   ", DIM))]
     for name, count in shown:
-        words = Text(f"{name.replace('_', ' ')} ", DIM)
+        words = Text.assemble((f"{name.replace('_', ' ')} ", DIM))
         words.append(f"{count:,}", _gravity(name, count))
         if rows[-1].cell_len > 7 and rows[-1].cell_len + words.cell_len > width:
             rows.append(Text(" " * 7))
         rows[-1].append_text(words).append("   ")
+    for row in rows:
+        row.rstrip()
     return rows
 
 
@@ -233,8 +235,10 @@ def events(seen: Seen, width: int, height: int) -> list[Text]:
         tone = {"error": BAD, "warning": WARN}.get(level, TITLE)
         times_seen = f" x {one.count}" if one.count > 1 else ""
         who = f"{one.who:<11}" if width >= 100 else ""
-        row = Text.assemble((f"{one.t_s:9.3f} s  ", DIM), (who, DIM), (name + times_seen, tone), f"  {about}")
-        rows.append(_cut(row, width))
+        row = Text.assemble((f"{one.t_s:9.3f} s  ", DIM), (who, DIM), (name + times_seen, tone), "  ")
+        short, _, numbers = about.partition(" (")
+        fits = not numbers or row.cell_len + len(about) <= width
+        rows.append(_cut(row.append(about if fits else short), width))
     return rows
 
 

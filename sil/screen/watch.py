@@ -95,8 +95,6 @@ class Lines(Watch):
     def stage(self, name: str) -> None:
         self._running = name == "run"
         self._next_s = time.monotonic() + PLAIN_EVERY_S
-        if self._reader is not None and name == "run":
-            self._reader.begin()
         if name == "seal":
             self._over()
 
