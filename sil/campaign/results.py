@@ -22,9 +22,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import IO, Any
 
+from sil.campaign.figures import summarise
 from sil.campaign.plan import Plan, read_plan
 from sil.campaign.records import Record
-from sil.campaign.statistics import summarise
 from sil.scenario_metrics import METRICS
 from sil.trouble import EXIT_LINK, UsageError
 

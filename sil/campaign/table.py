@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -33,27 +34,35 @@ METRICS = (  # key, label, unit, scale
 
 def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], console: Console | None = None) -> None:
     """Verdicts, the table that fits the sweep, and why points did not pass."""
-    console = console or Console(highlight=False)
+    console = console or Console(highlight=False, emoji=False)
     _headline(console, summary, plan)
     single = len(records) <= MOST_ROWS and all(sum(cell["verdicts"].values()) == 1 for cell in summary["cells"])
     if summary["cells"] and single:
         console.print(_points(plan, records))
+        caption = "worst axis: rms and peak error to reference in deg, peak torque in mN m"
     elif summary["cells"]:
         console.print(_cells(plan, summary["cells"]))
+        more = len(summary["cells"]) - MOST_ROWS
+        caption = "worst axis, deg: rms error to reference over the runs of a row, largest peak"
+        caption += f"; {more} more rows in summary.json" if more > 0 else ""
     else:
         console.print(_metrics(summary["metrics"]))
+        caption = "worst axis of each run"
+    console.print(f"[dim]{caption}[/]\n")
     _reasons(console, records)
     console.print(f"sweep: {summary['sweep_dir']}", soft_wrap=True)
     console.print("[dim]results.csv, results.json: every point; summary.json: every metric[/]", soft_wrap=True)
 
 
+def headline(summary: Mapping[str, Any]) -> str:
+    """One line without markup: verdicts, and where the results are."""
+    return f"{_verdicts(summary)}   {summary['name']}: {summary['sweep_dir']}"
+
+
 def _headline(console: Console, summary: Mapping[str, Any], plan: Plan) -> None:
-    counts = "   ".join(
-        f"[bold {COLOURS.get(verdict, 'red')}]{verdict} {count}[/]" for verdict, count in summary["verdicts"].items()
-    )
-    console.print(f"{counts}   {escape(plan.name)}: {summary['finished']} of {summary['points']} points", end="")
     workers = f"{summary['workers']} worker{'s' if summary['workers'] > 1 else ''}"
-    console.print(f" in {summary['wall_s']:.1f} s, {workers}")
+    points = f"{summary['finished']} of {summary['points']} points in {summary['wall_s']:.1f} s"
+    console.print(f"{_verdicts(summary, '[bold {colour}]', '[/]')}   {escape(plan.name)}: {points}, {workers}")
     sample = summary["sample"]
     if sample:
         drawn = sum(not axis.values for axis in plan.axes)
@@ -64,14 +73,22 @@ def _headline(console: Console, summary: Mapping[str, Any], plan: Plan) -> None:
     console.print()
 
 
+def _verdicts(summary: Mapping[str, Any], before: str = "", after: str = "") -> str:
+    """`passed 198   failed 2`, best first."""
+    ordered = sorted(summary["verdicts"].items(), key=lambda item: (item[0] != "passed", item[0]))
+    return "   ".join(
+        before.format(colour=COLOURS.get(verdict, "red")) + f"{verdict} {count}" + after for verdict, count in ordered
+    )
+
+
 def _metrics(metrics: Mapping[str, Any]) -> Table:
     """Statistics of the worst axis over all points."""
-    table = _table("worst axis of each run", *(">median", ">p95", ">max"), "", ">max at point")
+    table = _table("", ">median", ">p95", ">max", "", ">max at point")
     for key, label, unit, scale in METRICS:
         figures = metrics.get(key)
         if figures is None or not figures["count"] or (key == "missed" and not figures["max"]):
             continue
-        numbers = [_number(figures[name], scale) for name in ("median", "p95", "max")]
+        numbers = _numbers([figures[name] for name in ("median", "p95", "max")], scale)
         table.add_row(label, *numbers, unit, str(figures["max_at_point"]))
     return table
 
@@ -79,35 +96,26 @@ def _metrics(metrics: Mapping[str, Any]) -> Table:
 def _cells(plan: Plan, cells: Sequence[Mapping[str, Any]]) -> Table:
     """A row for each cell: how many passed, and the error of the worst axis over its seeds and draws."""
     table = _table(*_short(plan.cell_keys), ">passed", ">rms median", ">p95", ">max", ">peak")
-    for cell in cells[:MOST_ROWS]:
-        verdicts, metrics = cell["verdicts"], cell["metrics"]
-        rms, peak = metrics.get("rms_error_deg.max"), metrics.get("peak_error_deg.max")
-        row = [_number(rms[name] if rms else None) for name in ("median", "p95", "max")]
-        passed, all_ = verdicts.get("passed", 0), sum(verdicts.values())
-        colour = "green" if passed == all_ else "red"
+    shown_cells = cells[:MOST_ROWS]
+    wanted = [("rms_error_deg.max", name) for name in ("median", "p95", "max")] + [("peak_error_deg.max", "max")]
+    columns = [_numbers([cell["metrics"].get(key, {}).get(name) for cell in shown_cells]) for key, name in wanted]
+    for cell, *numbers in zip(shown_cells, *columns, strict=True):
+        passed, all_ = cell["verdicts"].get("passed", 0), sum(cell["verdicts"].values())
         values = [escape(_value(value)) for value in cell["values"].values()]
-        table.add_row(*values, f"[{colour}]{passed}/{all_}[/]", *row, _number(peak["max"] if peak else None))
-    table.caption = "error to reference in deg, worst axis: rms over the runs of a row, and the largest peak"
-    if len(cells) > MOST_ROWS:
-        table.caption += f"; {len(cells) - MOST_ROWS} more cells in summary.json"
+        colour = "green" if passed == all_ else "red"
+        table.add_row(*values, f"[{colour}]{passed}/{all_}[/]", *numbers)
     return table
 
 
 def _points(plan: Plan, records: Sequence[Record]) -> Table:
     """A row for each point of a small grid."""
     table = _table(">point", *_short(plan.cell_keys), "verdict", ">rms", ">peak", ">torque")
-    for record in records:
-        values = plan.points[record.point - 1].values
-        metrics = record.metrics
-        table.add_row(
-            str(record.point),
-            *(escape(_value(values[key])) for key in plan.cell_keys),
-            f"[{COLOURS.get(record.verdict, 'red')}]{record.verdict}[/]",
-            _number(metrics.get("rms_error_deg.max")),
-            _number(metrics.get("peak_error_deg.max")),
-            _number(metrics.get("peak_torque_Nm.max"), 1e3),
-        )
-    table.caption = "worst axis: rms and peak error to reference in deg, peak torque in mN m"
+    wanted = (("rms_error_deg.max", 1.0), ("peak_error_deg.max", 1.0), ("peak_torque_Nm.max", 1e3))
+    columns = [_numbers([record.metrics.get(key) for record in records], scale) for key, scale in wanted]
+    for record, *numbers in zip(records, *columns, strict=True):
+        values = [escape(_value(plan.points[record.point - 1].values[key])) for key in plan.cell_keys]
+        verdict = f"[{COLOURS.get(record.verdict, 'red')}]{record.verdict}[/]"
+        table.add_row(str(record.point), *values, verdict, *numbers)
     return table
 
 
@@ -129,7 +137,7 @@ def _reasons(console: Console, records: Sequence[Record]) -> None:
 
 def _table(*headers: str) -> Table:
     """Columns; a header that starts with > is of numbers."""
-    table = Table(box=None, pad_edge=False, header_style="bold", caption_justify="left", caption_style="dim")
+    table = Table(box=None, pad_edge=False, header_style="bold")
     for header in headers:
         right = header.startswith(">")
         table.add_column(header.removeprefix(">"), justify="right" if right else "left", overflow="fold")
@@ -152,5 +160,8 @@ def _value(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else value if isinstance(value, str) else shown(value)
 
 
-def _number(value: float | None, scale: float = 1.0) -> str:
-    return "-" if value is None else f"{value * scale:.4g}"
+def _numbers(values: Sequence[float | None], scale: float = 1.0) -> list[str]:
+    """With the same number of decimals, so that they can be compared: four digits of the largest."""
+    largest = max((abs(value) * scale for value in values if value is not None), default=0.0)
+    decimals = min(9, max(0, 3 - math.floor(math.log10(largest)))) if 0 < largest < math.inf else 0
+    return ["-" if value is None else f"{value * scale:.{decimals}f}" for value in values]

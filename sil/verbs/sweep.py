@@ -5,105 +5,208 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from sil.trouble import UsageError
-from sil.verbs.options import ClockOption, JsonOption, LinkOption, SetOption, print_json, scenario_from
+from sil.verbs import completion
+from sil.verbs.options import (
+    KEYS_PANEL,
+    RESULT_PANEL,
+    ClockOption,
+    JsonOption,
+    LinkOption,
+    QuietOption,
+    SetOption,
+    print_json,
+    scenario_from,
+)
 
 if TYPE_CHECKING:
     from sil.campaign.results import Results
     from sil.campaign.sweep import SweepWatch
     from sil.scenario import Scenario
 
+VARY_PANEL = "What is varied"
+SWEEP_PANEL = "How the sweep goes on"
 KEEP = ("none", "on-fail", "all")
+
+
+class Manner(NamedTuple):
+    """How a sweep is flown and told."""
+
+    workers: int | None
+    keep: str
+    as_json: bool
+    quiet: bool
+    again: Sequence[int] = ()
 
 
 def sweep(
     scenario: Annotated[
-        str | None, typer.Argument(metavar="SCENARIO", help="Built-in name (see `sil scenarios`) or YAML file.")
+        str | None,
+        typer.Argument(
+            metavar="SCENARIO",
+            help="Built-in name (see `sil scenarios`) or YAML file; none with --resume.",
+            autocompletion=completion.scenarios,
+        ),
     ] = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
             "--vary",
             metavar="KEY=SPEC",
-            help="a:b:n (n points), a:b (every whole number), a,b,c (these values); drawn: uniform(a,b), log(a,b), "
-            "normal(m,s), choice(a,b,c). Items of a list: plant.inertia_kgm2.0. Repeatable.",
+            help="One key and its values; repeatable. Listed: 0.5:0.9:9 (9 points), 1:20 (every whole number), "
+            "5,7.5,9 (these). Drawn: uniform(a,b), log(a,b), normal(mean,sigma), choice(a,b,c). "
+            "An item of a list: plant.inertia_kgm2.0.",
+            rich_help_panel=VARY_PANEL,
+            autocompletion=completion.sets,
         ),
     ] = None,
     vary_file: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="YAML with vary, set, sample, draws, seed; options go before it."),
+        typer.Option(
+            "--vary-file",
+            metavar="FILE",
+            help="YAML with vary, set, sample, draws, seed; an option goes before what the file says.",
+            rich_help_panel=VARY_PANEL,
+        ),
     ] = None,
     draws: Annotated[
-        int | None, typer.Option("--draws", "-n", metavar="N", help="How often the drawn keys are drawn.")
-    ] = None,
-    sample: Annotated[str | None, typer.Option(help="random (default) or lhs (Latin hypercube).")] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="Of the draws; default 0. The scenario's own is the key `seed`.")
-    ] = None,
-    jobs: Annotated[
         int | None,
-        typer.Option("--jobs", "-j", metavar="N", help="Worker processes. Default: one a CPU; 1 for a paced clock."),
+        typer.Option(
+            "--draws", "-n", metavar="N", help="How often the drawn keys are drawn.", rich_help_panel=VARY_PANEL
+        ),
     ] = None,
-    keep: Annotated[str, typer.Option(help="Run directories to keep: none, on-fail, all.")] = "none",
+    sample: Annotated[
+        str | None,
+        typer.Option(
+            "--sample", metavar="KIND", help="random (default) or lhs, a Latin hypercube.", rich_help_panel=VARY_PANEL
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            "--seed",
+            metavar="N",
+            help="Of the draws, default 0. The seed of a run is the key `seed`.",
+            rich_help_panel=VARY_PANEL,
+        ),
+    ] = None,
     set_: SetOption = None,
     clock: ClockOption = None,
     link: LinkOption = None,
-    board: Annotated[str | None, typer.Option("--board", help="inproc (default), process or none.")] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", help="Directory of the sweep; refused if not empty. Default: sweeps/NAME-NNN."),
+    board: Annotated[
+        str | None,
+        typer.Option(
+            "--board",
+            metavar="BOARD",
+            help="inproc (default), process, or where a board listens.",
+            rich_help_panel=KEYS_PANEL,
+            autocompletion=completion.boards,
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            "--jobs",
+            "-j",
+            metavar="N",
+            help="Worker processes. Default: one for each CPU; one alone where the clock is not lockstep.",
+            rich_help_panel=SWEEP_PANEL,
+        ),
     ] = None,
     resume: Annotated[
-        Path | None, typer.Option("--resume", metavar="DIR", help="Go on with a sweep; with -j, --keep, --json only.")
+        Path | None,
+        typer.Option(
+            "--resume",
+            metavar="DIR",
+            help="Go on with the sweep in this directory; its plan says what is varied.",
+            rich_help_panel=SWEEP_PANEL,
+        ),
     ] = None,
     retry_failed: Annotated[
         bool,
-        typer.Option("--retry-failed", help="With --resume: fly points again that failed for link, board, worker."),
+        typer.Option(
+            "--retry-failed",
+            help="With --resume: once more the points that failed for link, board, worker or timing.",
+            rich_help_panel=SWEEP_PANEL,
+        ),
     ] = False,
     again: Annotated[
         list[int] | None,
-        typer.Option("--again", metavar="N", help="With --resume: fly this point once more, keep its run. Repeatable."),
+        typer.Option(
+            "--again",
+            metavar="POINT",
+            help="With --resume: this point once more, to keep its run directory; repeatable.",
+            rich_help_panel=SWEEP_PANEL,
+        ),
+    ] = None,
+    keep: Annotated[
+        str,
+        typer.Option(
+            "--keep",
+            metavar="WHICH",
+            help="Run directories to keep: none, on-fail (exit code not 0) or all.",
+            rich_help_panel=RESULT_PANEL,
+        ),
+    ] = "none",
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="DIR",
+            help="Directory of the sweep; refused if not empty. Default: sweeps/NAME-NNN.",
+            rich_help_panel=RESULT_PANEL,
+        ),
     ] = None,
     as_json: JsonOption = False,
+    quiet: QuietOption = False,
 ) -> int:
-    """Run a scenario many times: a grid of values, seeds, or conditions drawn at random; one table of results.
+    """Run a scenario many times: a grid of values, seeds, conditions drawn at random; one table of results.
 
-    In process and in lockstep unless said otherwise: the same bytes as over any link, at thousands of times real time.
+    In process and in lockstep unless said otherwise: the same bytes as over any link, thousands of times faster than
+    real time.
 
     Listed keys form a grid. Drawn keys are drawn N times, and every cell of the grid flies the same draws. A draw that
-    the scenario refuses is drawn again; a refused point of a grid stays in the results as invalid, with its reason.
+    the scenario refuses is drawn again and counted; a refused point of a grid stays in the results as invalid, with its
+    reason. Statistics are over seeds and draws.
 
-    The directory has plan.json (written before anything runs), results.csv, results.json and summary.json: the same
+    Writes a directory: plan.json before anything runs; results.csv, results.json and summary.json, which are the same
     bytes with any number of workers, and after an interruption and --resume. Ctrl-C keeps every finished point.
 
-    Exit code: 130 interrupted; 2 nothing could be swept; 3 a point failed for link, board, worker or timing; 1 a point
-    did not meet its requirements or was invalid; 0 all passed.
+    Exit codes: 0 every point passed; 1 a point failed a requirement or was invalid; 2 nothing could be swept; 3 a point
+    failed for link, board, worker or timing; 130 interrupted.
 
     Examples: sil sweep mrac-rs232 --vary law.params.c2_pole=0.5:0.9:9 --vary seed=1:20 |
-    sil sweep appc-rs232 --vary 'sensors.attitude.noise_deg=log(0.001,0.1)' -n 100 --sample lhs |
-    sil sweep appc-rs232 --vary-file monte-carlo.yaml -j 2 --keep on-fail
+    sil sweep appc-rs232 --vary "sensors.attitude.noise_deg=log(0.001,0.1)" --sample lhs -n 100 |
+    sil sweep appc-rs232 --vary-file monte-carlo.yaml -j 2 --keep on-fail |
+    sil sweep --resume sweeps/appc-rs232-001
     """
     from sil.campaign.conditions import conditions_from
     from sil.campaign.sweep import checked_workers, new_sweep, old_sweep
 
-    workers = checked_workers(jobs)
+    manner = Manner(checked_workers(jobs), keep, as_json, quiet, tuple(again or ()))
     if keep not in KEEP:
         raise UsageError(f"--keep: expected one of {', '.join(KEEP)}, got {keep}")
     if resume is not None:
-        if scenario is not None or any((vary, vary_file, draws, sample, seed, set_, clock, link, board, out)):
-            raise UsageError(f"--resume: expected -j, --keep, --json beside it, since {resume}/plan.json says the rest")
-        return _fly(old_sweep(resume, retry_failed), workers, "all" if again else keep, as_json, again or ())
+        if (
+            scenario is not None
+            or any((vary, vary_file, draws, sample, set_, clock, link, board, out))
+            or seed is not None
+        ):
+            raise UsageError(
+                f"--resume: expected neither scenario nor keys beside it: {resume}/plan.json says them all"
+            )
+        return _fly(old_sweep(resume, retry_failed), manner._replace(keep="all" if again else keep))
     if retry_failed or again:
         raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")
     if scenario is None:
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
     base = _base(scenario, [*conditions.sets, *(set_ or ())], clock=clock, link=link, board=board)
-    return _fly(new_sweep(base, conditions, out, _watch(as_json)), workers, keep, as_json)
+    return _fly(new_sweep(base, conditions, out, _watch(manner)), manner)
 
 
 def _base(name: str, sets: list[str], clock: str | None, link: str | None, board: str | None) -> Scenario:
@@ -116,25 +219,27 @@ def _base(name: str, sets: list[str], clock: str | None, link: str | None, board
     return scenario_from(name, [*before, *sets], clock=clock, link=link, board=board)
 
 
-def _watch(as_json: bool) -> SweepWatch:
+def _watch(manner: Manner) -> SweepWatch:
     from sil.campaign.progress import Terminal
     from sil.campaign.sweep import SweepWatch
 
-    return SweepWatch() if as_json else Terminal()
+    return SweepWatch() if manner.as_json or manner.quiet else Terminal()
 
 
-def _fly(opened: Results, workers: int | None, keep: str, as_json: bool, again: Sequence[int] = ()) -> int:
+def _fly(opened: Results, manner: Manner) -> int:
     from sil.campaign.sweep import fly
-    from sil.campaign.table import show
+    from sil.campaign.table import headline, show
 
     if opened.torn:
         print(f"{opened.torn} damaged lines of results.jsonl: their points are flown again", file=sys.stderr)
-    summary = fly(opened, workers, keep, _watch(as_json), again)
-    if as_json:
+    summary = fly(opened, manner.workers, manner.keep, _watch(manner), manner.again)
+    if manner.as_json:
         print_json(summary)
+    elif manner.quiet:
+        print(headline(summary))
     else:
         show(summary, opened.plan, [opened.records[number] for number in sorted(opened.records)])
-    for number in again:
+    for number in manner.again:
         if (record := opened.records.get(number)) is not None and record.run_dir:
             print(f"point {number}: {opened.directory / record.run_dir}", file=sys.stderr)
     _say_how_to_go_on(summary)

@@ -9,9 +9,9 @@ import pytest
 
 from sil.campaign import results
 from sil.campaign.conditions import conditions_from
+from sil.campaign.figures import exit_code, summarise
 from sil.campaign.plan import make_plan
 from sil.campaign.records import Record, broken, flat_metrics, refused
-from sil.campaign.statistics import exit_code, summarise
 from sil.scenario import load_scenario
 from sil.trouble import UsageError
 
