@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 
 from rich.text import Text
 
 from sil.screen import marks
-from sil.screen.messages import error_deg
 from sil.screen.palette import AXES, DIM, TONES
 from sil.screen.seen import Seen
 
@@ -21,13 +21,13 @@ Points = list[tuple[float, float]]
 
 def worth_drawing(seen: Seen) -> bool:
     """A line needs two points."""
-    return len(seen.samples) >= 2
+    return len(seen.past) >= 2
 
 
 def past(seen: Seen, axis: int, width: int) -> str:
     """|error| of one axis (|attitude| without a reference) in `width` characters, the highest of which is its peak."""
-    first, now = (seen.samples[0][0], seen.samples[-1][0]) if seen.samples else (0.0, 0.0)
-    count = max(min(width, len(seen.samples)), 1)
+    first, now = (seen.past[0].t_s, seen.past[-1].t_s) if seen.past else (0.0, 0.0)
+    count = max(min(width, len(seen.past)), 1)
     points = [(t, abs(y)) for t, y in _curve(seen, "error" if seen.plan.follows else "attitude", axis)]
     values = marks.binned(points, first, now, count)
     top = max((y for _, y in points if math.isfinite(y)), default=0.0)
@@ -36,7 +36,7 @@ def past(seen: Seen, axis: int, width: int) -> str:
 
 def since(seen: Seen) -> str:
     """`so far`, or how far back the histories go."""
-    run_s = seen.samples[-1][0] if seen.samples else 0.0
+    run_s = seen.past[-1].t_s if seen.past else 0.0
     return "so far" if run_s <= seen.plan.window_s else f"of the last {seen.plan.window_s:g} s"
 
 
@@ -58,7 +58,7 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
     curve = _curve(seen, which, axis)
     series = [_curve(seen, "reference", axis), curve] if which == "attitude" and seen.plan.follows else [curve]
     low, high = marks.span([y for points in series for _, y in points], LEAST_SPAN_DEG)
-    first, now = seen.samples[0][0], seen.samples[-1][0]
+    first, now = seen.past[0].t_s, seen.past[-1].t_s
     inner = height - 2
     cells = marks.chart(series, (first, now, low, high), width - LABEL, inner)
     title = Text.assemble((f"{AXES[axis]} {which}, deg", TONES[axis]))
@@ -77,9 +77,9 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
 
 def _cells(line: Text, cells: Sequence[int], count: int, axis: int) -> Text:
     """One line of a chart: the last series in the colour of its axis, those under it dim."""
-    for cell in cells:
-        tone = TONES[axis] if cell >> 8 == count - 1 else DIM
-        line.append(chr(marks.BRAILLE + (cell & 0xFF)) if cell else " ", tone)
+    for is_last, run in groupby(cells, key=lambda cell: cell >> 8 == count - 1):
+        text = "".join([chr(marks.BRAILLE + (cell & 0xFF)) if cell else " " for cell in run])
+        line.append(text, TONES[axis] if is_last else DIM)
     return line
 
 
@@ -88,12 +88,9 @@ def _seconds(t_s: float) -> str:
 
 
 def _curve(seen: Seen, which: str, axis: int) -> Points:
-    points: Points = []
-    for sample in seen.samples:
-        t_s, attitude, reference = sample
-        if which == "attitude":
-            points.append((t_s, attitude[axis]))
-        elif reference is not None:
-            error = error_deg(sample)
-            points.append((t_s, reference[axis] if which == "reference" or error is None else error[axis]))
-    return points
+    """(s, deg) of `attitude`, `reference` or `error`, where it is known."""
+    if which == "attitude":
+        return [(one.t_s, one.attitude[axis]) for one in seen.past]
+    if which == "reference":
+        return [(one.t_s, one.reference[axis]) for one in seen.past if one.reference is not None]
+    return [(one.t_s, one.error[axis]) for one in seen.past if one.error is not None]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import groupby
 
 LEVELS = " ▁▂▃▄▅▆▇█"
 FULL, LEFT_HALF, RIGHT_HALF, ZERO = "━", "╸", "╺", "┿"
@@ -83,15 +84,21 @@ def chart(series: Sequence[Points], box: tuple[float, float, float, float], widt
     columns, rows = 2 * width - 1, 4 * height - 1
     for index, points in enumerate(series):
         before: tuple[int, int] | None = None
-        for x, y in points:
-            if not (math.isfinite(y) and x_low <= x <= x_high):
+        for column, values in groupby(points, key=lambda point: _place(point[0], x_low, x_high, columns)):
+            heights = [_place(y, y_high, y_low, rows) for _, y in values if math.isfinite(y)]
+            if not heights or not 0 <= column <= columns:
                 before = None
                 continue
-            share = min(max((y_high - y) / (y_high - y_low), -1.0), 2.0)  # far outside is as good as outside
-            here = (round((x - x_low) / (x_high - x_low) * columns), round(share * rows))
-            _line(cells, index, before or here, here)
-            before = here
+            _line(cells, index, before or (column, heights[0]), (column, heights[0]))
+            _line(cells, index, (column, min(heights)), (column, max(heights)))
+            before = (column, heights[-1])
     return cells
+
+
+def _place(value: float, low: float, high: float, count: int) -> int:
+    """Dot 0..count of a value in low..high; far outside is as good as outside."""
+    share = (value - low) / (high - low)
+    return round((-1.0 if share < -1.0 else 2.0 if share > 2.0 else share) * count)
 
 
 def _line(cells: list[list[int]], index: int, start: tuple[int, int], end: tuple[int, int]) -> None:

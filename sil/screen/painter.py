@@ -24,6 +24,7 @@ from sil.screen.messages import End, Line, Message, Plan, State
 from sil.screen.seen import Seen
 
 DRAW_EVERY_S = 0.1
+COST_SHARE = 0.2  # of the time, at most, goes into drawing
 LOOK_EVERY_S = 0.5  # at the size of the window, when nothing comes
 BIGGEST = 1 << 20  # bytes of a datagram
 READY = b"ready"
@@ -70,8 +71,11 @@ class Painter:
                 began = time.monotonic()
                 if select.select([self._orders], [], [], LOOK_EVERY_S)[0]:
                     self._take_all()
+                woke = time.monotonic()
                 self._draw()
-                time.sleep(0.0 if self._over else max(0.0, began + DRAW_EVERY_S - time.monotonic()))
+                now = time.monotonic()
+                pause_s = max(began + DRAW_EVERY_S, now + (now - woke) / COST_SHARE) - now
+                time.sleep(0.0 if self._over else max(0.0, pause_s))
         finally:
             if self._live is not None:
                 self._live.stop()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from sil.scenario import Scenario
 
 WINDOW_S = 600.0  # simulated: a manoeuvre; what lies further back is in the log
-SAMPLES = 1500  # of that window
+SAMPLES = 600  # of that window
 SAMPLES_A_LOOK = 50  # at most: a fast run's history is coarser, and costs no more
 REMEMBERED = 64  # ticks that TELEMETRY may lag behind
 MOST_NEW = 1000  # entries of one State, when the screen could not be told for a while

@@ -6,14 +6,24 @@ import math
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
-from sil.screen.messages import EventRow, Plan, Sample, State, error_deg
+from sil.screen.messages import EventRow, Plan, Sample, State, Triple, error_deg
 from sil.sinks.events import describe
 
 TIMES = 2000  # wake-ups and answers that percentiles are taken of
 EVENTS = 100
 SAMPLES = 4000
 NEAR = 4  # an event of a kind that is among the last few is counted there
+
+
+class Past(NamedTuple):
+    """One instant of the history, deg."""
+
+    t_s: float
+    attitude: Triple
+    reference: Triple | None
+    error: Triple | None
 
 
 @dataclass
@@ -67,7 +77,7 @@ class Seen:
 
     plan: Plan
     state: State | None = None
-    samples: deque[Sample] = field(default_factory=lambda: deque(maxlen=SAMPLES))  # of the plan's window
+    past: deque[Past] = field(default_factory=lambda: deque(maxlen=SAMPLES))  # of the plan's window
     peaks: list[float] = field(default_factory=lambda: [0.0] * 3)  # of the run: |error|, or |attitude| without one
     happenings: deque[Happening] = field(default_factory=lambda: deque(maxlen=EVENTS))
     late: Times = field(default_factory=Times)
@@ -89,10 +99,12 @@ class Seen:
             self._event(row)
 
     def _sample(self, sample: Sample) -> None:
-        self.samples.append(sample)
-        while self.samples[0][0] < sample[0] - self.plan.window_s:
-            self.samples.popleft()
-        values = error_deg(sample) if self.plan.follows else sample[1]
+        t_s, attitude, reference = sample
+        error = error_deg(sample)
+        self.past.append(Past(t_s, attitude, reference, error))
+        while self.past[0].t_s < t_s - self.plan.window_s:
+            self.past.popleft()
+        values = error if self.plan.follows else attitude
         if values is not None:
             self.peaks = [max(peak, value) for peak, value in zip(self.peaks, _finite(values), strict=True)]
 
