@@ -63,7 +63,7 @@ class SerialLink(StreamLink):
     @classmethod
     def open(cls, url: str, listen: bool) -> SerialLink:
         """`serial:///dev/X?baud=N`; the same at either end."""
-        return cls(*_parse(url))
+        return cls(*parse_url(url))
 
     @classmethod
     def pair(cls) -> tuple[Link, Link]:
@@ -102,8 +102,8 @@ class _Master(StreamLink):
         return SerialLink.pair()
 
 
-def _parse(url: str) -> tuple[str, int]:
-    """(path, baud) of serial:///dev/X?baud=N."""
+def parse_url(url: str) -> tuple[str, int]:
+    """(path, baud) of serial:///dev/X?baud=N. Raises LinkError when it is none."""
     parts = urlsplit(url)
     query = parse_qs(parts.query, keep_blank_values=True)
     baud = query.pop("baud", [str(DEFAULT_BAUD)])[0]

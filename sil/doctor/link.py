@@ -6,11 +6,10 @@ import os
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass, field
-from urllib.parse import urlsplit
 
 from protocol.link import Link, LinkError
 from protocol.links import open_link
-from protocol.links.serial import LineErrors, SerialLink
+from protocol.links.serial import LineErrors, SerialLink, parse_url
 from sil.boards import BoardHost, BoardOrder, plug_in
 from sil.doctor import LIMIT_S, bounded, verdicts
 from sil.doctor import device as devices
@@ -41,8 +40,11 @@ class Examination:
 
 
 def link_url(text: str) -> str:
-    """What the user named as a URL: a path is a serial port."""
-    return f"serial://{text}" if text.startswith("/") else text
+    """What the user named as a URL: a path is a serial port. Raises LinkError for what is no link to a board."""
+    url = f"serial://{text}" if text.startswith("/") else text
+    if url not in OWN_BOARDS and not url.startswith(("serial:", "udp:")):
+        raise LinkError(f"link: expected serial:///dev/X?baud=N, /dev/X, udp://HOST:PORT, pty or udp, got {text!r}")
+    return url
 
 
 def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
@@ -54,10 +56,11 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
     if url in OWN_BOARDS:
         yield from _own_board(order, url, tell)
         return
-    device = None
+    device, path = None, ""
     if url.startswith("serial:"):
-        device = devices.find(order.around, urlsplit(url).path, order.status)
-        for finding in _device(order, urlsplit(url).path, device):
+        path, _ = parse_url(url)
+        device = devices.find(order.around, path, order.status)
+        for finding in _device(order, path, device):
             yield finding
             if finding.status == PROBLEM:
                 return
@@ -66,7 +69,7 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
     except LinkError as error:
         if str(error).startswith("link:"):
             raise
-        commands = (f"sudo fuser -v {urlsplit(url).path}",) if device is not None else ()
+        commands = (f"sudo fuser -v {path}",) if device is not None else ()
         yield Finding(PROBLEM, str(error), "who has it open, of all users:", commands, check="open")
         return
     baud = link.baud if isinstance(link, SerialLink) and device is not None and not device.is_pty else None
@@ -75,7 +78,7 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
         answered = answered or finding.check == "board"
         yield finding
     if order.try_bauds and not answered:
-        yield try_bauds(order, url, device, tell)
+        yield try_bauds(path, device, tell)
 
 
 def _device(order: Examination, path: str, device: Device | None) -> Generator[Finding]:
@@ -136,14 +139,13 @@ def line_errors(link: Link) -> LineErrors | None:
     return link.line_errors() if isinstance(link, SerialLink) else None
 
 
-def try_bauds(order: Examination, url: str, device: Device | None, tell: Tell) -> Finding:
+def try_bauds(path: str, device: Device | None, tell: Tell) -> Finding:
     """HELLO at each usual baud rate in turn, and what comes at each."""
     if device is None or device.is_pty:
         return Finding(NOTE, "not tried: this link has no baud rate", check="try bauds")
     came = []
     for baud in USUAL_BAUDS:
         tell(f"trying {baud} baud")
-        path = urlsplit(url).path
         try:
             with closing(Talk(open_link(f"serial://{path}?baud={baud}", listen=False), baud)) as talk:
                 if talk.greet(TRY_BAUD_S, tell) is not None:

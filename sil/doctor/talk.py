@@ -12,13 +12,14 @@ import secrets
 import time
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from protocol import frames
 from protocol.channel import wire_time_ns
 from protocol.codec import encode
 from protocol.frames import Hello, Packet, Stop, Type
-from protocol.link import Link
+from protocol.link import Link, LinkError
 from protocol.port import Port
 from sil.doctor.overheard import Overheard, is_our_own
 
@@ -165,6 +166,7 @@ class Talk:
         try:
             if self._said_hello:
                 self._said_hello = False
-                self.port.send(Stop(frames.STOP_DONE))
+                with suppress(LinkError):  # the link may be what failed
+                    self.port.send(Stop(frames.STOP_DONE))
         finally:
             self.port.close()

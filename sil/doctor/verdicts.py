@@ -5,13 +5,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
-from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 
 from protocol import frames
 from protocol.frames import Hello
-from protocol.links.serial import DEFAULT_BAUD, LineErrors
+from protocol.links.serial import LineErrors, parse_url
 from protocol.port import PortCounters
 from sil.doctor.findings import NOTE, OK, PROBLEM, Finding
 from sil.doctor.overheard import Guess, guess, rows
@@ -205,7 +204,7 @@ def _garbage(talk: Talk, url: str, line: str) -> Finding:
     question = " Wrong baud, or text?" if seen.kind not in ("few", "frames") else ""
     found = f"no HELLO came back, but {talk.heard.count} bytes that are no frame.{question} {_capital(seen.found)}"
     numbers = {"kind": seen.kind, "bytes": talk.heard.count, "first": data[:64].hex(), "port": asdict(counters)}
-    commands = (f"{sys.executable} -m serial.tools.miniterm {' '.join(_port_of(url))}",) if seen.kind == "text" else ()
+    commands = _terminal_program(url) if seen.kind == "text" else ()
     return Finding(PROBLEM, found, seen.advice, commands, (line,), numbers, "hello", rows(data))
 
 
@@ -213,10 +212,11 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _port_of(url: str) -> tuple[str, str]:
-    """(path, baud) for a terminal program."""
-    parts = urlsplit(url)
-    return parts.path, (parse_qs(parts.query).get("baud") or [str(DEFAULT_BAUD)])[0]
+def _terminal_program(url: str) -> tuple[str, ...]:
+    if not url.startswith("serial:"):
+        return ()
+    path, baud = parse_url(url)
+    return (f"{sys.executable} -m serial.tools.miniterm {path} {baud}",)
 
 
 def _silence(talk: Talk, url: str, line: str) -> Finding:

@@ -85,7 +85,7 @@ def _findings(link: str | None, round_trips: int, try_bauds: bool, progress: Pro
     try:
         yield from examine_link(Examination(link, round_trips, try_bauds), progress.tell)
     except LinkError as error:  # what is wrong with a link that can be opened is a finding; this is no link at all
-        raise UsageError(f"--{error}; known: /dev/X, pty, udp") from None
+        raise UsageError(f"--{error}") from None
 
 
 @contextmanager
