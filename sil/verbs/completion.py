@@ -15,6 +15,7 @@ import typer
 
 Offer = tuple[str, str]  # a word and what it means, which zsh and fish show
 MOST_FILES = 200
+LONGEST = 70  # characters of what a word means
 DEVICES = ("/dev/serial/by-id/*", "/dev/ttyUSB*", "/dev/ttyACM*", "/dev/ttyAMA*")
 CLOCKS = (
     ("lockstep", "as fast as both sides can"),
@@ -65,13 +66,14 @@ def links(incomplete: str) -> list[Offer]:
 def sets(ctx: typer.Context, incomplete: str) -> list[Offer]:
     """KEY= and KEY=VALUE of every key of a scenario, a section at a time: `law.`, then `law.form=fixed`."""
     keys = {key: schema for key, schema in _keys(_laws(ctx)) if key.startswith(incomplete.partition("=")[0])}
-    sections = {key[: key.find(".", len(incomplete)) + 1] or key for key in keys}
-    if len(sections) > 1:  # such as law. and link. for `l`; a key that is complete has its = already
-        whole = [(f"{name}=" if name in keys else name, _about(keys.get(name, {}))) for name in sorted(sections)]
-        return _fitting(whole, incomplete)
-    return _fitting(
-        ((f"{key}={value}", _about(schema)) for key, schema in keys.items() for value in _values(schema)), incomplete
-    )
+    inside = incomplete
+    while len(sections := {key[: key.find(".", len(inside)) + 1] or key for key in keys}) == 1:
+        (only,) = sections
+        if not only.endswith("."):  # one key is left: its values
+            return _fitting(((f"{only}={value}", _about(keys[only])) for value in _values(keys[only])), incomplete)
+        inside = only
+    found = ((f"{name}=" if name in keys else name, _about(keys.get(name, {}))) for name in sorted(sections))
+    return _fitting(found, incomplete)
 
 
 # -- the schema ----------------------------------------------------------------------------------------------------
@@ -103,12 +105,16 @@ def _laws(ctx: typer.Context) -> tuple[str, ...]:
     said = [text.partition("=")[2] for text in ctx.params.get("set_") or () if text.startswith("law.name=")]
     if said:
         return (said[-1],)
-    try:
-        from sil.scenario_source import read_scenario
+    from sil.scenario_errors import ScenarioInvalid
+    from sil.scenario_source import read_scenario
 
-        return (str(read_scenario(str(ctx.params["scenario"]), ()).data["law"]["name"]),)
-    except (KeyError, TypeError, ValueError):  # no scenario yet, none of that name, or nothing said about its law
-        return ()
+    # While the value of --set is not there yet, the scenario is left among the arguments that nobody took.
+    for name in filter(None, (ctx.params.get("scenario"), *ctx.args)):
+        try:
+            return (str(read_scenario(str(name), ()).data["law"]["name"]),)
+        except (ScenarioInvalid, KeyError, TypeError):  # no such scenario, or it says nothing about its law
+            continue
+    return ()
 
 
 def _values(schema: dict[str, Any]) -> list[str]:
@@ -135,6 +141,12 @@ def _about(schema: dict[str, Any]) -> str:
     return str(schema.get("description", ""))
 
 
+def _short(about: str) -> str:
+    """One line without what a shell or rich would take for markup; longer ones are broken, which zsh cannot show."""
+    plain = about.translate(str.maketrans({"[": "(", "]": ")", "'": "’", "`": None, '"': None, "$": None}))
+    return plain if len(plain) <= LONGEST else plain[: LONGEST - 3] + "..."
+
+
 # -- files ---------------------------------------------------------------------------------------------------------
 
 
@@ -159,4 +171,4 @@ def _verdict(folder: Path) -> str:
 
 
 def _fitting(offers: Iterable[Offer], incomplete: str) -> list[Offer]:
-    return [(word, about) for word, about in dict.fromkeys(offers) if word.startswith(incomplete)]
+    return [(word, _short(about)) for word, about in dict.fromkeys(offers) if word.startswith(incomplete)]
