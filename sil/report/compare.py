@@ -22,7 +22,7 @@ from sil.report.look import AXIS_NAMES
 from sil.report.signals import controlled
 from sil.runs import Run
 
-WIDE = 116  # characters from which on all columns fit
+WIDE = 120  # characters from which on all columns fit
 _FOLLOWING = ("rms_error_deg", "rms_setpoint_error_deg", "peak_error_deg", "settling_s")  # needs somebody who follows
 _COLOURS = {"passed": "green", "interrupted": "yellow", "degraded": "yellow", "failed": "red"}
 
@@ -38,11 +38,11 @@ class Column(NamedTuple):
 
 
 COLUMNS = (
-    Column("rms_error_deg", "rms error", "deg", 1.0, False),
-    Column("peak_error_deg", "peak error", "deg", 1.0, False),
+    Column("rms_error_deg", "rms\nerror", "deg", 1.0, False),
+    Column("peak_error_deg", "peak\nerror", "deg", 1.0, False),
     Column("rms_setpoint_error_deg", "rms to\nset-point", "deg", 1.0, True),
-    Column("settling_s", "settling", "s", 1.0, False),
-    Column("effort_Nms", "effort", "N m s", 1.0, False),
+    Column("settling_s", "\nsettling", "s", 1.0, False),
+    Column("effort_Nms", "\neffort", "N m s", 1.0, False),
     Column("rms_torque_Nm", "rms\ntorque", "mN m", 1e3, True),
     Column("peak_torque_Nm", "peak\ntorque", "mN m", 1e3, True),
     Column("peak_momentum_Nms", "peak\nmomentum", "mN m s", 1e3, True),
@@ -80,14 +80,15 @@ def rows(runs: Sequence[Run], verdicts: Mapping[int, str] | None = None) -> list
 
 def table(found: Sequence[Row], width: int) -> Table:
     """For reading: the smallest value of an axis among the runs that did not diverge is bold."""
-    columns = [column for column in COLUMNS if width >= WIDE or not column.wide]
-    made = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0), header_style="bold")
-    made.add_column("run", overflow="fold", min_width=12, vertical="bottom")
-    made.add_column("axis", vertical="bottom")
+    wide = width >= WIDE
+    columns = [column for column in COLUMNS if wide or not column.wide]
+    made = Table(box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1 if wide else 0, 0, 0), header_style="bold")
+    made.add_column("\n\nrun", overflow="fold", min_width=12)
+    made.add_column("\n\naxis", no_wrap=True)
     for column in columns:
         made.add_column(f"{column.heading}\n{column.unit}", justify="right", no_wrap=True)
-    made.add_column("missed", justify="right")
-    made.add_column("verdict")
+    made.add_column("\n\nmissed", justify="right", no_wrap=True)
+    made.add_column("\n\nverdict", no_wrap=True)
     best = {column.metric: [_best(found, column.metric, axis) for axis in range(3)] for column in columns}
     for i, row in enumerate(found):
         cells = [_cells(row, column, best[column.metric]) for column in columns]
@@ -100,13 +101,12 @@ def table(found: Sequence[Row], width: int) -> Table:
 
 def notes(found: Sequence[Row]) -> Iterator[str]:
     """What the table does not say by itself."""
-    lengths = dict.fromkeys(f"{row.duration_s:g} s from tick {row.metrics['from_tick']} on" for row in found)
-    if len(lengths) > 1:
+    if len({row.duration_s for row in found}) > 1:
         yield f"not over the same time: {', '.join(f'{row.label} {row.duration_s:g} s' for row in found)}"
     if len({row.metrics["from_tick"] for row in found}) > 1:
         starts = ", ".join(f"{row.label} {row.metrics['from_tick']}" for row in found)
         yield f"not from the same tick on: {starts}"
-    if len(found) > 1:
+    if any(_best(found, column.metric, axis) is not None for column in COLUMNS for axis in range(3)):
         yield "bold: the smallest among the runs that did not diverge"
     if any(math.inf in (row.metrics["settling_s"] or ()) for row in found):
         yield "never: not within 2 % of the step (at least 0.1 deg) before the next one"
@@ -122,8 +122,8 @@ def csv(found: Sequence[Row]) -> str:
     facts = ("label", "run", "scenario", "law", "seed", "verdict", "reason", "ticks", "duration_s")
     writer.writerow([*facts, *(name for names in wide for name in names)])
     for row in found:
-        values = (row.metrics[name] for name in metrics)
-        numbers = [(value or [None] * 3) if name in triples else [value] for name, value in zip(metrics, values)]
+        values = [(name, row.metrics[name]) for name in metrics]
+        numbers = [(value or [None] * 3) if name in triples else [value] for name, value in values]
         writer.writerow([*(getattr(row, fact) for fact in facts), *(number for each in numbers for number in each)])
     return out.getvalue()
 
@@ -159,9 +159,12 @@ def _plain(value: Any) -> Any:
 
 
 def _best(found: Sequence[Row], metric: str, axis: int) -> float | None:
-    """The smallest of an axis, where two or more can be compared and they are not all the same."""
-    calm = [row.metrics[metric] for row in found if row.metrics["diverged_at_s"] is None]
-    numbers = [values[axis] for values in calm if values and values[axis] is not None and math.isfinite(values[axis])]
+    """The smallest of an axis, where two or more were measured over the same time and are not all the same."""
+    calm = [row for row in found if row.metrics["diverged_at_s"] is None]
+    if len({(row.duration_s, row.metrics["from_tick"]) for row in calm}) > 1:
+        return None
+    triples = [row.metrics[metric] for row in calm]
+    numbers = [t[axis] for t in triples if t and t[axis] is not None and math.isfinite(t[axis])]
     return min(numbers) if len(set(numbers)) > 1 else None
 
 
@@ -179,7 +182,8 @@ def _number(value: float | None, factor: float) -> str:
         return "-"
     if math.isinf(value):
         return "never"
-    return "not a no." if math.isnan(value) else f"{value * factor:.4g}"
+    scaled = value * factor
+    return "NaN" if math.isnan(value) else f"{scaled:.0f}" if 1e4 <= scaled < 1e6 else f"{scaled:.4g}"
 
 
 def _missed(row: Row) -> str:

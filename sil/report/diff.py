@@ -76,7 +76,7 @@ def diff(a: Run, b: Run) -> Difference:
     """Compare two runs."""
     equal, packet = _first_packet(a, b)
     truth = _truth(a, b)
-    config = _config(a, b)
+    config = config_difference(a, b)
     return Difference(
         str(a.path),
         str(b.path),
@@ -164,8 +164,8 @@ def _first_packet(a: Run, b: Run) -> tuple[int, PacketDifference | None]:
     return len(rows[0]), None
 
 
-def _config(a: Run, b: Run) -> list[tuple[str, Any, Any]]:
-    """Words of CONFIG that differ, by name."""
+def config_difference(a: Run, b: Run) -> list[tuple[str, Any, Any]]:
+    """Words of CONFIG that differ: (name, in a, in b), wire units."""
     named = []
     for run in (a, b):
         law = _law_of(run)

@@ -74,13 +74,41 @@ def export(
     return EXIT_OK
 
 
-def diff(a: RunArgument, b: RunArgument, as_json: JsonOption = False) -> int:
-    """Compare two runs packet by packet: identical, or what differs first and how far the motion departs."""
-    from sil.report import diff as differ
+def diff(
+    a: RunArgument,
+    b: RunArgument,
+    close: Annotated[
+        bool, typer.Option("--close", help="Within tolerances, for logs from another machine, instead of bit for bit.")
+    ] = False,
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--tolerance",
+            metavar="SIGNAL=VALUE",
+            help="Another tolerance, such as attitude_deg=1e-9; the unit is the signal's, for telemetry a fraction of "
+            "each word's peak. Means --close; repeatable.",
+        ),
+    ] = None,
+    as_json: JsonOption = False,
+) -> int:
+    """Compare two runs: identical, or what differs first and how far the motion departs.
 
+    Bit for bit, frame by frame, unless tolerances are asked for. With --close it says how far each signal departs at
+    most, and from which tick on it is beyond its tolerance; CONFIG, frames with their ticks and fates, flags, counters
+    and events have to be equal then too. The tolerances by default let pass what a reading rounded the other way on
+    another machine leads to: 1e-3 deg, 1e-4 N m.
+
+    Exit codes: 0 identical, or within tolerances; 1 they differ; 2 usage, or not a run.
+
+    Examples: sil diff A B | sil diff mine theirs --close | sil diff A B --tolerance attitude_deg=1e-9
+    """
+    from sil.report import diff as differ
+    from sil.report import tolerance as tolerances
+
+    if close or tolerance:
+        near = tolerances.close(opened(a), opened(b), tolerances.tolerances(tolerance or ()))
+        print_json(near.as_dict()) if as_json else print(tolerances.text(near))
+        return EXIT_OK if near.within else EXIT_REQUIREMENT
     found = differ.diff(opened(a), opened(b))
-    if as_json:
-        print_json(found.as_dict())
-    else:
-        print(differ.text(found))
+    print_json(found.as_dict()) if as_json else print(differ.text(found))
     return EXIT_OK if found.identical else EXIT_REQUIREMENT
