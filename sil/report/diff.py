@@ -8,7 +8,7 @@ the files are the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
@@ -68,8 +68,13 @@ class Difference(NamedTuple):
             "packet": self.packet._asdict() if self.packet else None,
             "truth": {key: value if np.isfinite(value) else None for key, value in truth.items()} or None,
             "config": [{"word": word, "a": a, "b": b} for word, a, b in self.config],
-            "identity": [{"key": key, "a": a, "b": b} for key, a, b in self.identity],
+            "identity": as_pairs(self.identity),
         }
+
+
+def as_pairs(identity: Sequence[tuple[str, Any, Any]]) -> list[dict[str, Any]]:
+    """The same for JSON."""
+    return [{"key": key, "a": a, "b": b} for key, a, b in identity]
 
 
 def diff(a: Run, b: Run) -> Difference:
@@ -87,7 +92,7 @@ def diff(a: Run, b: Run) -> Difference:
         config,
         packet,
         truth,
-        list(_identity(a, b)),
+        list(identity_difference(a, b)),
     )
 
 
@@ -101,10 +106,15 @@ def text(found: Difference) -> str:
         if len(found.config) > _LINES_SHOWN:
             lines.append(f"CONFIG differs in {len(found.config) - _LINES_SHOWN} words more")
         lines += [*_packet_lines(found), *_truth_lines(found)]
-    if found.identity:
-        lines += ["", f"{'what the runs were':<38}{'a':<36}b"]
-        lines += [f"  {key:<35} {_short(x):<35} {_short(y)}" for key, x, y in found.identity]
-    return "\n".join(lines)
+    return "\n".join([*lines, *identity_lines(found.identity)])
+
+
+def identity_lines(identity: Sequence[tuple[str, Any, Any]]) -> list[str]:
+    """What the runs were, side by side; [] where they were the same."""
+    if not identity:
+        return []
+    lines = ["", f"{'what the runs were':<38}{'a':<36}b"]
+    return [*lines, *(f"  {key:<35} {_short(x):<35} {_short(y)}" for key, x, y in identity)]
 
 
 def fields_of(packet: bytes, law: LawTable | None = None) -> dict[str, Any]:
@@ -228,7 +238,8 @@ def _bits(rows: Any) -> list[bytes]:
     return [data[i : i + size] for i in range(0, len(data), size)]
 
 
-def _identity(a: Run, b: Run) -> Iterator[tuple[str, Any, Any]]:
+def identity_difference(a: Run, b: Run) -> Iterator[tuple[str, Any, Any]]:
+    """What the runs say of themselves: (key, in a, in b) where that differs."""
     x, y = ({**_flat(run.meta), **_flat(run.scenario, "scenario.")} for run in (a, b))
     for key in dict.fromkeys([*x, *y]):
         if x.get(key, ABSENT) != y.get(key, ABSENT):

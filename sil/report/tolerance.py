@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from protocol import frames
-from sil.report.diff import config_difference
+from sil.report.diff import as_pairs, config_difference, identity_difference, identity_lines
 from sil.runs import Array, PacketRow, Run, wrapped_deg
 from sil.trouble import UsageError
 
@@ -71,13 +71,14 @@ class Closeness(NamedTuple):
     frames_other_bytes: int  # at the same place, with other content
     unequal: list[str]
     departures: list[Departure]
+    identity: list[tuple[str, Any, Any]]  # what the runs say of themselves: (key, in a, in b)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values: what is not finite is null."""
         found = [departure._asdict() for departure in self.departures]
         for departure in found:
             departure["largest"] = departure["largest"] if math.isfinite(departure["largest"]) else None
-        return {**self._asdict(), "departures": found}
+        return {**self._asdict(), "departures": found, "identity": as_pairs(self.identity)}
 
 
 def tolerances(texts: Sequence[str]) -> dict[str, float | None]:
@@ -111,6 +112,7 @@ def close(a: Run, b: Run, allowed: Mapping[str, float | None] = DEFAULTS) -> Clo
         sum(x.packet[:2] + x.packet[4:-4] != y.packet[:2] + y.packet[4:-4] for x, y in zip(*rows, strict=False)),
         unequal,
         departures,
+        list(identity_difference(a, b)),
     )
 
 
@@ -128,7 +130,7 @@ def text(found: Closeness) -> str:
         row = f"{signal:<26}{_number(largest) + of:>19}{'-' if tick is None else tick:>9}"
         row += f"{'-' if tolerance is None else format(tolerance, 'g'):>11}"
         lines.append(row + (f"{'tick ' + str(beyond):>13}" if beyond is not None else ""))
-    return "\n".join(lines)
+    return "\n".join([*lines, *identity_lines(found.identity)])
 
 
 # -- what has to be equal ----------------------------------------------------------------------------------------------
