@@ -12,6 +12,7 @@ from sil.screen import NORMAL, QUIET, VERBOSE, requirement_text
 
 AXES = ("roll", "pitch", "yaw")
 ALWAYS_SHOWN = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")  # the others if not zero
+NARROWEST = 80  # columns of the table: a narrow terminal wraps it, numbers are never cut
 BAR = 40  # characters of the fullest line of a histogram
 ROWS = (
     ("rms_error_deg", "rms error to reference", "deg", 1.0),
@@ -25,6 +26,7 @@ ROWS = (
 def show(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
     """QUIET: the verdict and where the run lies, in one line. VERBOSE: with a histogram of the wake-ups."""
     console = Console(highlight=False, soft_wrap=True)
+    console.width = max(console.width, NARROWEST)
     if verbosity <= QUIET:
         console.print(f"{_verdict(summary)}  {summary['scenario']}: {summary['run_dir']}")
         return
