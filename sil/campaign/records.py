@@ -77,7 +77,7 @@ def _reason(summary: Mapping[str, Any]) -> str:
     if summary["not_a_number"]:
         reasons.append("torque or plant was not a number")
     if summary["verdict"] == "degraded":
-        reasons.append(f"{summary['timing']['degraded_ticks']} ticks woke too late")
+        reasons.append(f"{summary['timing']['late_ticks']} ticks woke too late")
     if not reasons and summary["reason"] == "diverged" and summary["exit_code"]:
         reasons.append(f"diverged at {summary['metrics']['diverged_at_s']:g} s")
     return " ".join("; ".join(reasons).split())

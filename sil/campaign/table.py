@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from sil.campaign.plan import Plan
+from sil.campaign.plan import SEED_KEY, Plan
 from sil.campaign.records import Record
 from sil.scenario_errors import shown
 
@@ -46,12 +47,26 @@ def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], cons
         caption = "worst axis, deg: rms error to reference over the runs of a row, largest peak"
         caption += f"; {more} more rows in summary.json" if more > 0 else ""
     else:
-        console.print(_metrics(summary["metrics"]))
+        console.print(_metrics(summary["metrics"], plan.scenario["board"] != "none"))
         caption = "worst axis of each run"
     console.print(f"[dim]{caption}[/]\n")
     _reasons(console, records)
+    if seed_is_idle(plan, records):
+        console.print("[yellow]note[/]  the seed changes nothing here: no noise in this scenario", soft_wrap=True)
     console.print(f"sweep: {summary['sweep_dir']}", soft_wrap=True)
     console.print("[dim]results.csv, results.json: every point; summary.json: every metric[/]", soft_wrap=True)
+
+
+def seed_is_idle(plan: Plan, records: Sequence[Record]) -> bool:
+    """The seed was varied, and no figure of any run depends on it: somebody expected noise that is not there."""
+    if SEED_KEY not in plan.keys:
+        return False
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        others = {key: value for key, value in plan.points[record.point - 1].values.items() if key != SEED_KEY}
+        groups.setdefault(json.dumps(others), []).append(record)
+    several = [those for those in groups.values() if len(those) > 1 and those[0].metrics]
+    return bool(several) and all(record.metrics == those[0].metrics for those in several for record in those)
 
 
 def headline(summary: Mapping[str, Any]) -> str:
@@ -81,12 +96,14 @@ def _verdicts(summary: Mapping[str, Any], before: str = "", after: str = "") -> 
     )
 
 
-def _metrics(metrics: Mapping[str, Any]) -> Table:
-    """Statistics of the worst axis over all points."""
+def _metrics(metrics: Mapping[str, Any], errors: bool) -> Table:
+    """Statistics of the worst axis over all points. errors: somebody follows a reference."""
     table = _table("", ">median", ">p95", ">max", "", ">max at point")
     for key, label, unit, scale in METRICS:
         figures = metrics.get(key)
-        if figures is None or not figures["count"] or (key == "missed" and not figures["max"]):
+        if figures is None or not figures["count"] or ("error" in key and not errors):
+            continue
+        if key == "missed" and not figures["max"]:
             continue
         numbers = _numbers([figures[name] for name in ("median", "p95", "max")], scale)
         table.add_row(label, *numbers, unit, str(figures["max_at_point"]))

@@ -232,6 +232,7 @@ def _fly(opened: Results, manner: Manner) -> int:
 
     if opened.torn:
         print(f"{opened.torn} damaged lines of results.jsonl: their points are flown again", file=sys.stderr)
+    before = {number: opened.records[number].sha256 for number in manner.again if number in opened.records}
     summary = fly(opened, manner.workers, manner.keep, _watch(manner), manner.again)
     if manner.as_json:
         print_json(summary)
@@ -241,7 +242,9 @@ def _fly(opened: Results, manner: Manner) -> int:
         show(summary, opened.plan, [opened.records[number] for number in sorted(opened.records)])
     for number in manner.again:
         if (record := opened.records.get(number)) is not None and record.run_dir:
-            print(f"point {number}: {opened.directory / record.run_dir}", file=sys.stderr)
+            other = before.get(number, record.sha256) != record.sha256
+            said = ": not the bytes it had before, on this machine something else decides" if other else ""
+            print(f"point {number}: {opened.directory / record.run_dir}{said}", file=sys.stderr)
     _say_how_to_go_on(summary)
     return int(summary["exit_code"])
 

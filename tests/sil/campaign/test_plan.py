@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from sil.campaign.conditions import conditions_from
@@ -94,3 +96,16 @@ def test_a_full_inertia_matrix_says_how_its_items_are_called():
     with pytest.raises(UsageError, match=r"expected plant.inertia_kgm2.0.0"):
         plan("plant.inertia_kgm2.0=2,3", sets=full)
     assert len(plan("plant.inertia_kgm2.0.0=2,2.5", sets=full).points) == 2
+
+
+@pytest.mark.parametrize("scenario", ["appc-rs232", "mrac-rs232"])
+def test_the_monte_carlo_example_is_a_plan(scenario):
+    file = Path(__file__).resolve().parents[3] / "docs" / "examples" / "monte-carlo.yaml"
+    conditions = conditions_from(file, (), None, 20, None)
+    made = make_plan(load_scenario(scenario, [*SHORT, *conditions.sets]), conditions)
+    assert len(made.points) == 20 and not any(point.refused for point in made.points)
+    believed = (2.13, 3.04, 3.09)
+    for point in made.points:
+        for axis, mine in enumerate(believed):
+            assert 0.7 * mine - 1e-9 <= point.values[f"plant.inertia_kgm2.{axis}"] <= 1.3 * mine + 1e-9
+        assert point.values["sensors.attitude.bits"] in (16, 24) and isinstance(point.values["seed"], int)

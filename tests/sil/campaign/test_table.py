@@ -1,0 +1,62 @@
+"""What a person is shown fits 80 columns, tells reasons once, and says when a varied seed decided nothing."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from rich.console import Console
+
+from sil.campaign import table
+from sil.campaign.conditions import conditions_from
+from sil.campaign.figures import summarise
+from sil.campaign.plan import make_plan
+from sil.campaign.records import Record
+from sil.scenario import load_scenario
+
+
+def shown(vary, records, draws=None):
+    plan = make_plan(
+        load_scenario("mrac-rs232", ["board=inproc", "duration_s=5"]), conditions_from(None, vary, None, draws, 1)
+    )
+    records = records[: len(plan.points)]
+    summary = summarise(plan, records) | {"wall_s": 1.0, "workers": 2, "sweep_dir": "sweeps/x-001"}
+    out = io.StringIO()
+    table.show(summary, plan, records, Console(file=out, width=80, highlight=False, emoji=False))
+    return out.getvalue()
+
+
+def flown(point, rms, passed=True):
+    metrics = {"rms_error_deg.max": rms, "peak_error_deg.max": 2 * rms, "peak_torque_Nm.max": 0.05}
+    reason = "" if passed else f"rms_error_deg.max < 0.1, got {rms:.4g}"
+    return Record(point, "passed" if passed else "failed", 0 if passed else 1, reason, metrics, f"sha{point}")
+
+
+@pytest.mark.parametrize(
+    ("vary", "draws", "must"),
+    [
+        (["law.params.c2_pole=0.5:0.9:9"], None, ["point  c2_pole  verdict", "0.55", "50.00"]),
+        (["law.params.c2_pole=0.5:0.9:3", "seed=1:3"], None, ["c2_pole  passed  rms median", "3/3"]),
+        (["sensors.attitude.noise_deg=uniform(0.01,0.05)"], 9, ["median", "drawn 9 times", "0.0500", "max at point"]),
+    ],
+)
+def test_each_kind_of_sweep_has_its_table_in_80_columns(vary, draws, must):
+    text = shown(vary, [flown(n, n / 100) for n in range(1, 10)], draws)
+    for part in must:
+        assert part in text, text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "failed" not in text
+
+
+def test_a_reason_is_told_once_with_its_points():
+    records = [flown(n, n / 10, passed=n < 2) for n in range(1, 10)]
+    text = shown(["law.params.c2_pole=0.5:0.9:9"], records)
+    assert text.count("rms_error_deg.max < 0.1") == 1
+    assert "8 points 2, 3, 4, 5, 6, 7, ...: rms_error_deg.max < 0.1" in text
+
+
+def test_a_seed_that_decides_nothing_is_said():
+    vary = ["law.params.c2_pole=0.5,0.6", "seed=1:2"]
+    same = [flown(1, 0.1), flown(2, 0.1), flown(3, 0.2), flown(4, 0.2)]
+    assert "the seed changes nothing here" in shown(vary, same)
+    assert "the seed changes nothing here" not in shown(vary, [*same[:3], flown(4, 0.3)])
