@@ -23,8 +23,10 @@ HOME = Path(sil.__file__).resolve().parents[1]
 # Modules of our dependencies that a script of a user's might be called after.
 BORROWED = frozenset(("cobs", "google", "matplotlib", "mcap", "numba", "numpy", "pydantic", "rich", "serial", "typer"))
 MINIMUM = re.compile(r"^([A-Za-z0-9._-]+)\s*>=\s*([0-9][0-9.]*)")
-ASK_BOARD = "from firmware_sim import jit; print(jit.cache_directory())"
-ASK_BOARD_S = 15.0
+ASK_CACHES = (
+    "import sil.jit, firmware_sim.jit as board; print(sil.jit.cache_directory()); print(board.cache_directory())"
+)
+ASK_CACHES_S = 15.0
 KEEP_OLD = 5  # caches of former sources that are no matter
 
 
@@ -211,21 +213,19 @@ def _wrong_serial() -> Finding | None:
 
 
 def compiled_code(around: Surroundings) -> Finding:
-    """The directories where numba keeps what it compiled, of the laboratory and of a board process."""
-    from sil.jit import cache_directory
+    """The directories where numba keeps what it compiled, of the laboratory and of the board.
 
-    return judge_cache({"sil": cache_directory(), "firmware_sim": _board_cache()})
-
-
-def _board_cache() -> Path:
-    """Asked of a process started as a board is, since it may see other things than we do."""
+    Asked of a process that is started as a board process is: it has to start, and may see other things than we do.
+    """
     from sil.boards.process import child_environment
 
-    command = [sys.executable, "-P", "-c", ASK_BOARD]
-    done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, timeout=ASK_BOARD_S)
-    if done.returncode:
-        raise RuntimeError(f"a board process does not start: {done.stderr.strip().splitlines()[-1:]}")
-    return Path(done.stdout.strip())
+    command = [sys.executable, "-P", "-c", ASK_CACHES]
+    done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, timeout=ASK_CACHES_S)
+    said = done.stdout.splitlines()
+    if done.returncode or len(said) != 2:
+        last = [line for line in done.stderr.splitlines() if line.strip()][-1:]
+        return Finding(PROBLEM, f"numba does not start in a process of its own: {' '.join(last)}")
+    return judge_cache({"sil": Path(said[0]), "firmware_sim": Path(said[1])})
 
 
 def judge_cache(directories: Mapping[str, Path]) -> Finding:

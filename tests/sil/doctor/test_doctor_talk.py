@@ -6,6 +6,7 @@ import random
 import time
 
 import pytest
+from fake_machine import character_device
 from far_ends import echo_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,8 @@ from protocol.codec import StreamDecoder, encode
 from protocol.frames import Type
 from protocol.link import Link, LinkError
 from sil.doctor import NOTE, OK, PROBLEM, overheard, talk, verdicts
+from sil.doctor import link as link_module
+from sil.doctor.device import Device
 from sil.doctor.overheard import Overheard, guess, rows
 from sil.doctor.talk import RoundTrips, Talk
 
@@ -160,6 +163,27 @@ def test_wire_time_of_an_exchange() -> None:
     conversation = Talk(Scripted(), 115200)
     assert conversation.exchange_bytes == 118
     assert conversation.wire_ns == 10_243_056
+
+
+def test_try_bauds_finds_the_one_that_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[Scripted] = []
+
+    def open_link(url: str, listen: bool) -> Link:
+        nobody = frozenset(range(1000))
+        console = b"login: " * 40 if url.endswith("=9600") else b""
+        opened.append(Scripted(console, lost=frozenset() if url.endswith("=57600") else nobody))
+        return opened[-1]
+
+    monkeypatch.setattr(link_module, "open_link", open_link)
+    monkeypatch.setattr(link_module, "TRY_BAUD_S", 0.03)
+    port = Device("/dev/ttyUSB0", "/dev/ttyUSB0", character_device())
+    found = link_module.try_bauds("/dev/ttyUSB0", port, silent)
+    assert found.found == "a board answers at 57600 baud"
+    assert found.commands == ("sil doctor --link 'serial:///dev/ttyUSB0?baud=57600'",)
+    assert all(one.closed for one in opened)
+    monkeypatch.setattr(link_module, "USUAL_BAUDS", (9600, 19200))
+    found = link_module.try_bauds("/dev/ttyUSB0", port, silent)
+    assert found.found == "no board answers at 9600, 19200; what came: 9600: text"
 
 
 # -- verdicts ---------------------------------------------------------------------------------------------------------
