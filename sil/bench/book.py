@@ -48,11 +48,11 @@ class Goal:
         return all(value <= self.limit if self.at_most else value >= self.limit for value in judged)
 
     def text(self) -> str:
-        """`ratio <= 1.5`, `sil <= 5`, `sil <= beside + 1`."""
+        """`<= 1.5` of the ratio, `sil <= 5` of our own figure, `sil <= +1`: at most one more than beside."""
         sign = "<=" if self.at_most else ">="
         if self.of == "ratio":
-            return f"ratio {sign} {self.limit:g}"
-        return f"sil {sign} {self.limit:g}" if self.of == "ours" else f"sil {sign} beside + {self.limit:g}"
+            return f"{sign} {self.limit:g}"
+        return f"sil {sign} {self.limit:g}" if self.of == "ours" else f"sil {sign} {self.limit:+g}"
 
 
 @dataclass

@@ -12,6 +12,7 @@ from sil.bench.book import Book, Line, spread
 from sil.bench.series import Watch
 
 PLAIN_EVERY_S = 10.0
+NAMES_WIDTH = 22  # of the first column, at most, before others are wrapped to make room
 
 
 class Progress(Watch):
@@ -111,15 +112,17 @@ def table_of(lines: Sequence[Line]) -> Any:
     names = {line.beside_what for line in lines if line.beside_what}
     units = {line.unit for line in lines}
     unit = f", {next(iter(units))}" if len(units) == 1 else ""
-    table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False)
-    table.add_column("", overflow="fold")
+    table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False, padding=(0, 2, 0, 0))
+    longest = max(len(line.case) if line.case.count(", ") > 1 else len(_head(line)) for line in lines)
+    table.add_column("", overflow="fold", min_width=min(longest, NAMES_WIDTH))
     for header in ("ratio", "low", "high"):
         table.add_column(header, justify="right", no_wrap=True)
     for header in (f"sil{unit}", next(iter(names)) if len(names) == 1 else "beside"):
         table.add_column(header, justify="right", overflow="fold")
-    table.add_column("goal", overflow="fold")
+    goals = [len(f"missed {line.goal.text()}") for line in lines if line.goal]
+    table.add_column("goal", no_wrap=True, min_width=max(goals, default=0))
     shown = [line for line in lines if line.ours]
-    for head, members in groupby(shown, key=lambda line: line.case.rpartition(", ")[0]):
+    for head, members in groupby(shown, key=_head):
         group = list(members)
         if heading := head if head and len(group) > 1 else "":
             table.add_row(f"[dim]{heading}[/]")
@@ -127,6 +130,11 @@ def table_of(lines: Sequence[Line]) -> Any:
             case = f"  {line.case.removeprefix(f'{heading}, ')}" if heading else line.case
             table.add_row(case, *cells(line, with_unit=len(units) > 1, with_name=len(names) > 1))
     return table
+
+
+def _head(line: Line) -> str:
+    """What the lines of a group have in common: `100 Hz FIFO 50` of `100 Hz FIFO 50, p99`."""
+    return line.case.rpartition(", ")[0]
 
 
 def cells(line: Line, with_unit: bool, with_name: bool) -> list[str]:
@@ -146,7 +154,7 @@ def cells(line: Line, with_unit: bool, with_name: bool) -> list[str]:
 
 
 def goal_text(line: Line) -> str:
-    """`met ratio <= 1.5`."""
+    """`met <= 1.5`: without a name it is the ratio's."""
     if line.goal is None or line.met is None:
         return ""
     verdict = "[green]met[/]" if line.met else "[red]missed[/]"
