@@ -25,7 +25,7 @@ from sil.plants.rigid import parameters_of
 from sil.sinks.nothing import Nothing
 
 UNIT = "x real time"
-BESIDE = "Basilisk, Python law"
+BESIDE = "Basilisk"
 GAINS = (0.02, 0.4)  # of the PD beside: it settles, and that is all that is asked of it
 RATIO_PTY, RATIO_IN_PROCESS, TIMES_REAL_TIME = 1.0, 5.0, 5000.0
 
@@ -53,14 +53,14 @@ def our_speeds(book: Book, folder: Path, duration_s: int, compared: bool) -> Ite
     keys = ("law.form=fixed", *flights.OVER_PTY, f"duration_s={duration_s}")
     goal = Goal(RATIO_PTY, at_most=False) if compared else None
     summary = flights.recorded(flights.scenario("pd", *keys), folder)
-    yield book.line("pty, pd fixed, logged", UNIT, beside, goal, True), _speed(summary)
+    yield book.line("sil run over a pty, pd fixed", UNIT, beside, goal, True), _speed(summary)
     for law in ("pd", "appc", "mrac"):
         scenario = flights.scenario(law, "law.form=float", *flights.IN_PROCESS, f"duration_s={duration_s}")
         ticks, wall_s = flights.unrecorded(scenario, Nothing())
         goal = Goal(TIMES_REAL_TIME, "ours", at_most=False)
         if law == "pd" and compared:
             goal = Goal(RATIO_IN_PROCESS, at_most=False)
-        line = book.line(f"in process, {law} float, no log", UNIT, beside, goal, True)
+        line = book.line(f"in process without log, {law} float", UNIT, beside, goal, True)
         yield line, ticks * scenario.period_s / wall_s
 
 

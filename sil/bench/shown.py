@@ -113,8 +113,7 @@ def table_of(lines: Sequence[Line]) -> Any:
     units = {line.unit for line in lines}
     unit = f", {next(iter(units))}" if len(units) == 1 else ""
     table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False, padding=(0, 2, 0, 0))
-    longest = max(len(line.case) if line.case.count(", ") > 1 else len(_head(line)) for line in lines)
-    table.add_column("", overflow="fold", min_width=min(longest, NAMES_WIDTH))
+    table.add_column("", overflow="fold", min_width=min(max(len(_head(line)) for line in lines), NAMES_WIDTH))
     for header in ("ratio", "low", "high"):
         table.add_column(header, justify="right", no_wrap=True)
     for header in (f"sil{unit}", next(iter(names)) if len(names) == 1 else "beside"):

@@ -49,7 +49,7 @@ def test_a_goal_is_never_squeezed_out_of_a_narrow_table() -> None:
     """Long names, two long headers: the verdict is what a reader looks for."""
     book = Book("loop", "the whole loop")
     goal = Goal(5000.0, of="ours", at_most=False)
-    book.line("in process, appc float, no log", "x real time", "Basilisk, Python law", goal).add(5613.0, 4055.0)
+    book.line("in process without a log and so on, appc float", "x real time", "Basilisk", goal).add(5613.0, 4055.0)
     assert any("met sil >= 5000" in line for line in shown(book, 80))
 
 
