@@ -43,13 +43,11 @@ class Terminal(SweepWatch):
 
     def wait(self) -> None:
         if self._bar is not None:
-            self._bar.update(
-                self._task, completed=self._flown, refresh=True, bad=self._bad_text(), left=f"{self._left()} left"
-            )
+            self._bar.update(self._task, completed=self._flown, refresh=True, bad=self._bad_text(), left=self._left())
         elif not self._live and time.monotonic() - self._said >= PLAIN_EVERY_S:
             self._said = time.monotonic()
             bad = f"  {self._bad_text()}" if self._bad else ""
-            line = f"{self._name}: {self._flown}/{self._points} points{bad}  {self._left()} left"
+            line = f"{self._name}: {self._flown}/{self._points} points{bad}  {self._left()}"
             print(line, file=sys.stderr, flush=True)
 
     def end(self) -> None:
@@ -63,11 +61,11 @@ class Terminal(SweepWatch):
     def _left(self) -> str:
         """From the mean time of a point so far; the first round of the workers includes their start."""
         if not self._flown:
-            return "--:--"
+            return "first points under way"  # an installation's first run compiles
         seconds = round((time.monotonic() - self._began) / self._flown * (self._points - self._flown))
         minutes, seconds = divmod(seconds, 60)
         hours, minutes = divmod(minutes, 60)
-        return f"{hours}:{minutes:02d}:{seconds:02d}" if hours else f"{minutes}:{seconds:02d}"
+        return f"{hours}:{minutes:02d}:{seconds:02d} left" if hours else f"{minutes}:{seconds:02d} left"
 
     def _start_bar(self) -> None:
         from rich.console import Console
@@ -82,5 +80,5 @@ class Terminal(SweepWatch):
         )
         console = Console(stderr=True)
         self._bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
-        self._task = self._bar.add_task(self._name, total=self._points, bad="", left="--:-- left")
+        self._task = self._bar.add_task(self._name, total=self._points, bad="", left=self._left())
         self._bar.start()

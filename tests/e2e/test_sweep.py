@@ -135,17 +135,14 @@ def test_a_worker_that_dies_costs_its_point_only(cli):
 
 
 def test_requirements_and_refused_points_decide_the_exit_code(cli):
-    summary = cli.json(
-        "sweep", "appc-rs232", "--vary", "plant.inertia_kgm2.0=2.13,7", *SHORT, "--out", "s", code=1,
-    )  # fmt: skip
-    assert summary["verdicts"] == {"invalid": 1, "passed": 1}
+    strict = ("--set", "duration_s=20", "--set", "require=[{metric: rms_error_deg.max, below: 1e-9}]")
+    summary = cli.json("sweep", "appc-rs232", "--vary", "plant.inertia_kgm2.0=2.13,7", *strict, "--out", "s", code=1)
+    assert summary["verdicts"] == {"failed": 1, "invalid": 1}
     assert (summary["exit_code"], summary["finished"], summary["points"]) == (1, 2, 2)
-    fine, refused = table(cli.folder / "s")
-    assert (fine["exit_code"], refused["exit_code"], refused["sha256"]) == ("0", "2", "")
+    failed, refused = table(cli.folder / "s")
+    assert (failed["exit_code"], refused["exit_code"], refused["sha256"]) == ("1", "2", "")
+    assert failed["reason"].startswith("rms_error_deg.max < 1e-09, got ")
     assert "sum of the other two" in refused["reason"]
-    failing = ("--set", "require=[{metric: rms_error_deg.max, below: 1e-9}]", "--set", "duration_s=20")
-    cli("sweep", "appc-rs232", "--vary", "seed=1:2", *failing, "--out", "t", code=1)
-    assert table(cli.folder / "t")[0]["reason"].startswith("rms_error_deg.max < 1e-09, got ")
 
 
 @pytest.mark.parametrize(
