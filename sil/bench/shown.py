@@ -12,7 +12,6 @@ from sil.bench.book import Book, Line, spread
 from sil.bench.series import Watch
 
 PLAIN_EVERY_S = 10.0
-NAMES_WIDTH = 22  # of the first column, at most, before others are wrapped to make room
 
 
 class Progress(Watch):
@@ -113,13 +112,12 @@ def table_of(lines: Sequence[Line]) -> Any:
     units = {line.unit for line in lines}
     unit = f", {next(iter(units))}" if len(units) == 1 else ""
     table = Table(box=None, pad_edge=False, header_style="dim", show_edge=False, padding=(0, 2, 0, 0))
-    table.add_column("", overflow="fold", min_width=min(max(len(_head(line)) for line in lines), NAMES_WIDTH))
+    table.add_column("", overflow="fold")
     for header in ("ratio", "low", "high"):
         table.add_column(header, justify="right", no_wrap=True)
     for header in (f"sil{unit}", next(iter(names)) if len(names) == 1 else "beside"):
         table.add_column(header, justify="right", overflow="fold")
-    goals = [len(f"missed {line.goal.text()}") for line in lines if line.goal]
-    table.add_column("goal", no_wrap=True, min_width=max(goals, default=0))
+    table.add_column("goal", no_wrap=True)
     shown = [line for line in lines if line.ours]
     for head, members in groupby(shown, key=_head):
         group = list(members)
