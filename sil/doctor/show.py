@@ -14,6 +14,7 @@ COLOURS = {OK: "green", NOTE: "yellow", PROBLEM: "bold red"}
 STATUS_COLUMN, NAME_COLUMN = 9, 14
 STEP = 3  # by which the second piece of a folded line is indented
 WIDE, NARROW_INDENT = 98, " " * 4
+PLAIN = str.maketrans("→▁▂▃▄▅▆▇█", ">.:-=+*%#")  # for an output that takes no more
 WIDEST = 160  # longer lines are hard to read
 QUIET_S = 2.0  # nothing is said of what takes less
 PLAIN_EVERY_S = 5.0
@@ -26,13 +27,15 @@ class Page:
         from rich.console import Console
 
         self._console = Console(highlight=False, soft_wrap=True)
-        self._arrow = "→ " if "utf" in (self._console.encoding or "").lower() else "> "
+        self._encoding = self._console.encoding
+        self._arrow = self._writable("→ ")
         self._width = min(self._console.width, WIDEST) if self._console.is_terminal else 0
 
     def show(self, finding: Finding) -> None:
         """One finding: what was found, what to do, more of what was found, what to type."""
         from rich.text import Text
 
+        finding = Finding(*(self._writable(value) for value in finding))
         colour = COLOURS[finding.status]
         indent = " " * (STATUS_COLUMN + NAME_COLUMN)
         first, *more = self._folded(finding.found, 0) or [""]
@@ -50,7 +53,8 @@ class Page:
         for row in finding.raw:  # 73 columns wide
             self._print(Text((NARROW_INDENT if 0 < self._width < WIDE else indent) + row, style="dim"))
         for command in finding.commands:
-            self._print(Text.assemble(indent, ("$ ", "dim"), (command, "cyan")))
+            fits = not self._width or len(indent) + len(command) + 2 <= self._width
+            self._print(Text.assemble(indent if fits else NARROW_INDENT, ("$ ", "dim"), (command, "cyan")))
 
     def summary(self, findings: Iterable[Finding], subject: str) -> None:
         """The last line: how many of each."""
@@ -62,12 +66,20 @@ class Page:
         said = f", {notes} note{'s' * (notes != 1)}, {statuses.count(OK)} ok" if statuses else ""
         self._print(Text.assemble("\n", (f"{subject}: ", "bold"), word, said))
 
+    def _writable(self, value: Any) -> Any:
+        """A text (or a tuple of them) in the characters that the output takes; anything else as it is."""
+        if isinstance(value, tuple):
+            return tuple(self._writable(piece) for piece in value)
+        if not isinstance(value, str) or "utf" in self._encoding.lower():
+            return value
+        return value.translate(PLAIN).encode(self._encoding, "replace").decode(self._encoding)
+
     def _folded(self, text: str, step: int) -> list[str]:
         """`text` in pieces that fit, indented by `step` more; whole where the output is no terminal."""
         room = self._width - STATUS_COLUMN - NAME_COLUMN - step
         if room < 20:
             return [text] if text else []
-        return textwrap.wrap(text, room, break_long_words=False, break_on_hyphens=False)
+        return textwrap.wrap(text, room, break_on_hyphens=False)
 
     def _print(self, text: Any) -> None:
         self._console.print(text, soft_wrap=True)

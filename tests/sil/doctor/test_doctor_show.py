@@ -36,7 +36,9 @@ def test_prose_is_folded_and_commands_and_bytes_are_not(width: int) -> None:
     assert all(len(line) <= width for line in lines if COMMAND not in line)
     assert sum(row in line for row in FINDING.raw for line in lines) == len(FINDING.raw)
     assert lines[0].startswith("problem  latency timer a sentence")
-    assert all(line[: STATUS_COLUMN + NAME_COLUMN].isspace() for line in lines[1:] if "|" not in line)
+    assert all(
+        line[: STATUS_COLUMN + NAME_COLUMN].isspace() for line in lines[1:] if "|" not in line and COMMAND not in line
+    )
 
 
 def test_a_pipe_gets_whole_lines() -> None:
@@ -53,3 +55,10 @@ def test_the_last_line_counts(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_json_holds_everything() -> None:
     assert list(FINDING.as_dict()) == ["check", "status", "found", "advice", "commands", "lines", "raw", "data"]
+
+
+def test_an_output_that_takes_ascii_only_gets_ascii() -> None:
+    page = Page()
+    page._encoding = "ascii"
+    assert page._writable(("▁█ → µs", "x")) == (".# > ?s", "x")
+    assert page._writable({"any": "thing"}) == {"any": "thing"}
