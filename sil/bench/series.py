@@ -1,12 +1,12 @@
-"""Runs benches one after the other; Ctrl-C or SIGTERM ends the series, and what is finished stays."""
+"""Runs benches one after the other; Ctrl-C, SIGTERM or a closed terminal ends the series, what is finished stays."""
 
 from __future__ import annotations
 
 import signal
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import Any, Protocol
 
 from sil.bench import BENCHES, machine
 from sil.bench.book import Book, Plan
@@ -93,18 +93,23 @@ def _measure(bench: Bench, plan: Plan, book: Book) -> None:
 
 @contextmanager
 def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM ends the series as Ctrl-C does. Outside the main thread Python installs no handlers; then nobody asks."""
+    """SIGTERM, and SIGHUP unless it is ignored (nohup), end the series as Ctrl-C does.
+
+    Outside the main thread Python installs no handlers; then nobody asks.
+    """
 
     def interrupt(number: int, frame: object) -> None:
         raise KeyboardInterrupt
 
-    handler: Callable[[int, object], None] = interrupt
+    before: dict[signal.Signals, Any] = {}
     try:
-        before = signal.signal(signal.SIGTERM, handler)
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                before[number] = signal.signal(number, interrupt)
     except ValueError:
-        yield
-        return
+        before.clear()
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -132,7 +132,7 @@ def test_a_child_does_not_outlive_its_time() -> None:
         run_child([sys.executable, "-c", "import time; time.sleep(60)"], 0.2)
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_no_child_outlives_a_bench_that_is_ended(number: int, tmp_path: Path) -> None:
     """SIGKILL leaves the bench no time for anything; the kernel ends the child."""
     program = (
