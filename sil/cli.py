@@ -15,7 +15,7 @@ import typer
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
 from sil.verbs import bench, compare, doctor, replay, report, run, scenario, sweep
-from sil.verbs.manual import page_of
+from sil.verbs.manual import exit_codes, page_of
 
 app = typer.Typer(
     name="sil",
@@ -25,9 +25,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Attitude-control testbed: a simulated satellite, a real link, a separate controller, one scenario file.\n\n"
-    "Start with [bold]sil run mrac-rs232[/], then [bold]sil plot[/] and [bold]sil replay[/] on the run it names.",
-    epilog="Exit codes: 0 passed, 1 a requirement failed or something differed, 2 usage or invalid scenario, "
-    "3 link or board failure or degraded timing, 130 interrupted.",
+    "[not dim]Start with [bold]sil run mrac-rs232[/], then [bold]sil plot[/] and [bold]sil replay[/] on the run it "
+    "names. [bold]sil VERB -h[/] says what a verb reads and writes, with examples. TAB completes scenarios, runs and "
+    "keys once [bold]sil --install-completion[/] was run.[/]",
+    epilog=exit_codes(
+        "0 passed, 1 a requirement failed or something differed, 2 usage or invalid scenario, "
+        "3 link or board failure or degraded timing, 130 interrupted"
+    ),
 )
 
 
