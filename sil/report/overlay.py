@@ -183,13 +183,13 @@ class _Page:
             line(ax, run.t_s, unbroken(run.reference_deg[:, column]), color=self.look.ink, lw=0.9, ls=DASHED, zorder=5)
 
     def finish(self, lowest: set[Axes]) -> None:
-        """Time axis at the lowest panels only."""
+        """Numbers under the lowest panel of each column, the time axis' name at the foot of the page."""
         runs = self.ensemble.runs
         ends = [float(run.t_s[-1]) + run.period_s for run in runs]
         for ax in self.figure.axes:
             ax.set_xlim(min(float(run.t_s[0]) for run in runs), max(ends))
             ax.tick_params(labelbottom=ax in lowest)
-            if ax in lowest:
+            if ax in lowest and ax.get_position().y0 < self.place["bottom"] + 1e-6:
                 ax.set_xlabel("time in s", fontsize=11, color=self.look.ink)
         self.figure.align_ylabels([ax for ax in self.figure.axes if ax.get_ylabel()])
 

@@ -16,6 +16,7 @@ from sil.trouble import UsageError
 
 GROUP = "identification"
 NO_ANSWER = -1
+_OURS = ("attitude", "error", "torque", "momentum", "rate", "lateness", "answer")  # no word of TELEMETRY hides them
 _IDENTIFIED = {
     "g": ("gain g", "1", "Identified gain g (inertia = believed inertia / g)"),
     "b0": ("b0", "rad/(N m)", "Identified b0"),
@@ -72,8 +73,7 @@ def signals_of(run: Run) -> dict[str, Signal]:
     if not controlled(run):
         found.pop(1)
     signals = {signal.name: signal for signal in found}
-    for name in _reported_names(run):
-        signals.setdefault(name, _reported(run, name))
+    signals |= {name: _reported(run, name) for name in _reported_names(run)}
     if _timing_file(run).exists():
         signals |= {signal.name: signal for signal in _TIMES[: 2 if controlled(run) else 1]}
     return signals
@@ -125,7 +125,7 @@ def _reported_names(run: Run) -> list[str]:
     """Triples in TELEMETRY, the identification first."""
     triples = [name.removesuffix("_x") for name in run.telemetry if name.endswith("_x")]
     whole = [name for name in triples if all(f"{name}_{axis}" in run.telemetry for axis in AXES)]
-    return [*identified(run), *(name for name in whole if name not in _IDENTIFIED)]
+    return [*identified(run), *(name for name in whole if name not in _IDENTIFIED and name not in _OURS)]
 
 
 def _reported(run: Run, name: str) -> Signal:

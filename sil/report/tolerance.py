@@ -196,10 +196,12 @@ def _fields(what: str, x: Array, y: Array, names: Sequence[str]) -> Iterator[str
 
 
 def _counters(a: Run, b: Run) -> Iterator[str]:
+    """Where both runs have the TELEMETRY; that it is missing in one of them is a difference of the frames."""
     for name in _COUNTERS:
         if name in a.telemetry and name in b.telemetry:
             ticks, rows_a, rows_b = np.intersect1d(a.tick, b.tick, return_indices=True)
-            other = np.flatnonzero(_apart(a[name][rows_a], b[name][rows_b]) > 0)
+            x, y = a[name][rows_a], b[name][rows_b]
+            other = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & (x != y))
             if other.size:
                 yield f"TELEMETRY {name}: first at tick {int(ticks[other[0]])}"
 

@@ -157,7 +157,7 @@ def test_another_parameter_is_a_config_difference_and_what_it_led_to(run: Run, f
 
 
 def test_every_page_is_drawn(run: Run, tmp_path: Path) -> None:
-    files = plot(run, tmp_path / "pictures")
+    files = plot([run], tmp_path / "pictures")
     assert [f.stem for f in files] == ["overview", "attitude", "error", "torque", "momentum"]
     for file in files:
         with Image.open(file) as image:
@@ -168,7 +168,7 @@ def test_every_page_is_drawn(run: Run, tmp_path: Path) -> None:
 def test_identification_has_a_page_where_a_law_tells_of_it(run: Run) -> None:
     names = [f"{name}_{axis}" for name in ("g", "trace") for axis in "xyz"]
     run.telemetry.update({name: np.linspace(1.0, 2.0, len(run)) for name in names})
-    made_pages = pages(run)
+    made_pages = pages([run])
     for name in names:
         del run.telemetry[name]
     assert made_pages[-1].name == "identification"
@@ -177,20 +177,20 @@ def test_identification_has_a_page_where_a_law_tells_of_it(run: Run) -> None:
 
 
 def test_one_file_by_suffix(run: Run, tmp_path: Path) -> None:
-    assert plot(run, tmp_path / "run.pdf")[0].read_bytes().startswith(b"%PDF")
-    assert plot(run, tmp_path / "run.png")[0].read_bytes().startswith(b"\x89PNG")
+    assert plot([run], tmp_path / "run.pdf")[0].read_bytes().startswith(b"%PDF")
+    assert plot([run], tmp_path / "run.png")[0].read_bytes().startswith(b"\x89PNG")
     with pytest.raises(PlotError, match=r"expected one of \.png, \.pdf or a directory, got \.gif"):
-        plot(run, tmp_path / "run.gif")
+        plot([run], tmp_path / "run.gif")
     with pytest.raises(PlotError, match="No such file"):
-        plot(run, tmp_path / "no" / "run.png")
+        plot([run], tmp_path / "no" / "run.png")
 
 
 def test_a_run_without_reference_is_drawn_against_its_setpoint(tmp_path: Path) -> None:
     run = made(tmp_path / "a", ticks=40, lose=(5, 6), telemetry_every=7)
     run.telemetry.clear()
     run.__dict__.update(_reference_deg=np.full((40, 3), np.nan), _error_deg=np.full((40, 3), np.nan))
-    assert [page.name for page in pages(run)] == ["overview", "attitude", "error", "torque", "momentum"]
-    assert "set-point" in pages(run)[2].figure.texts[0].get_text()
+    assert [page.name for page in pages([run])] == ["overview", "attitude", "error", "torque", "momentum"]
+    assert "set-point" in pages([run])[2].figure.texts[0].get_text()
 
 
 def test_a_run_without_board_has_no_error_to_show(tmp_path: Path) -> None:
@@ -198,5 +198,5 @@ def test_a_run_without_board_has_no_error_to_show(tmp_path: Path) -> None:
     run.config_words.clear()
     run.commands = run.commands[:0]
     run.__dict__.update(_reference_deg=np.full((40, 3), np.nan), _error_deg=np.full((40, 3), np.nan))
-    assert [page.name for page in pages(run)] == ["overview", "attitude", "torque", "momentum"]
-    assert "none: torque from a schedule" in pages(run)[0].figure.texts[1].get_text()
+    assert [page.name for page in pages([run])] == ["overview", "attitude", "torque", "momentum"]
+    assert "none: torque from a schedule" in pages([run])[0].figure.texts[1].get_text()
