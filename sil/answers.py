@@ -7,6 +7,7 @@ answer; in real time it takes what is there. The modelled arrival alone decides 
 from __future__ import annotations
 
 import time
+from array import array
 from collections.abc import Callable
 
 from protocol import events, frames
@@ -52,7 +53,7 @@ class Answers:
         self._early: list[Packet] = []  # answers to ticks that are still to come: the board's own timer was faster
         self._sent_wall_ns = 0
         self._advanced_wall_ns = time.monotonic_ns()
-        self.answer_ns: list[int] = []
+        self.answer_ns = array("q")
         self.last_answer_ns = NO_ANSWER
         self.telemetry: Telemetry | None = None  # the newest that came, for whoever watches
         self.strays = 0  # frames that belong to no answer under way: repeated, too old, too far ahead; dropped

@@ -56,7 +56,7 @@ def check(scenario: Scenario) -> list[Finding]:
     if scenario.board == "none":
         checks.insert(0, _schedule)
     else:
-        checks = [_law, _sensors, _clock, _deadline, *checks, _manoeuvre]
+        checks = [_law, _sensors, _clock, _deadline, _lateness_limit, *checks, _manoeuvre]
     found = [finding for each in checks for finding in each(scenario)]
     return sorted(found, key=lambda finding: finding.severity != "error")
 
@@ -109,6 +109,14 @@ def _clock(scenario: Scenario) -> Iterator[Finding]:
     if scenario.sample_timeout_us >= scenario.period_us:
         expected = f"a number in s below the period ({scenario.period_s:g})"
         yield _error(scenario, "sample_timeout_s", expected, shown(scenario.sample_timeout_us * 1e-6))
+
+
+def _lateness_limit(scenario: Scenario) -> Iterator[Finding]:
+    """A tick that is a period late moves the clock and is late, whatever the scenario permits."""
+    limit_ms, scale = scenario.timing.max_lateness_ms, scenario.clock_scale
+    if limit_ms is not None and scale and limit_ms * 1e-3 > scenario.period_s / scale:
+        most = f"at most a period on the wall ({scenario.period_s / scale * 1e3:g} ms), beyond it every tick is late"
+        yield _warning(scenario, "timing.max_lateness_ms", most, f"{limit_ms:g}")
 
 
 def _deadline(scenario: Scenario) -> Iterator[Finding]:

@@ -206,6 +206,9 @@ WARNINGS = {
     "wheels filled by a disturbance": ("plant: {disturbance_Nm: [1e-3, 0, 0]}", "plant.disturbance_Nm.constant_Nm"),
     "too weak wheels": ("actuators: {wheels: {torque_max_Nm: 0.07}}", "actuators.wheels.torque_max_Nm"),
     "too small wheels": ("actuators: {wheels: {momentum_max_Nms: 0.09}}", "actuators.wheels.momentum_max_Nms"),
+    "a limit beyond the period": (
+        "clock: scaled:20\ntiming: {max_lateness_ms: 100}", "timing.max_lateness_ms",
+    ),
     "reference too fast to sample": (
         "guidance: {wn_radps: 1.5, profile: hold}\nplant: {initial: {attitude_deg: [0, 0, 0]}}", "guidance.wn_radps",
     ),
