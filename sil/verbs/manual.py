@@ -28,7 +28,7 @@ def page_of(verb: Callable[..., Any]) -> Page:
     examples = [EXAMPLES.sub("", each, count=1) for each in others if EXAMPLES.match(each)]
     codes = [EXIT_CODES.sub("", each, count=1) for each in others if EXIT_CODES.match(each)]
     prose = [_one_line(each) for each in others if not EXAMPLES.match(each) and not EXIT_CODES.match(each)]
-    below = ["\n".join(["[bold]Examples[/]", *(f"  [cyan]{line}[/]" for line in _split(each))]) for each in examples]
+    below = ["\n".join(["[bold]Examples[/]", *(f"[cyan]  {line}[/]" for line in _split(each))]) for each in examples]
     below += [exit_codes(each) for each in codes]
     return Page("\n\n".join([_one_line(first), *(f"[not dim]{each}[/]" for each in prose)]), "\n\n".join(below))
 
@@ -41,7 +41,7 @@ def _split(examples: str) -> list[str]:
 def exit_codes(text: str) -> str:
     """`0 passed, 1 a requirement failed; 130 interrupted.` as a list, a line each."""
     parts = re.split(r"[,;] (?=[0-9])", _one_line(text).removesuffix("."))
-    lines = [f"  {code:>3}  {about}" for code, _, about in (part.partition(" ") for part in parts)]
+    lines = [f"[not bold]  {code:>3}  {about}[/]" for code, _, about in (part.partition(" ") for part in parts)]
     return "\n".join(["[bold]Exit codes[/]", *lines])
 
 

@@ -47,7 +47,7 @@ def scenarios(as_json: JsonOption = False) -> int:
     They are files of the package, to run by name, to extend (`extends: mrac-rs232` as first line of your own) or to
     read. Writes a table on stdout.
 
-    Exit codes: 0.
+    Exit codes: 0 always.
 
     Examples: sil scenarios | sil scenarios --json
     """
@@ -72,7 +72,7 @@ def schema(
     scenario `# yaml-language-server: $schema=FILE`, FILE as --path says, and keys are completed and checked as you
     type. It cannot tell what only `sil check` can: whether keys fit each other, and whether deadlines can be met.
 
-    Exit codes: 0.
+    Exit codes: 0 always.
 
     Examples: sil schema --path | sil schema > scenario.schema.json
     """
