@@ -37,6 +37,14 @@ def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], cons
     """Verdicts, the table that fits the sweep, and why points did not pass."""
     console = console or Console(highlight=False, emoji=False)
     _headline(console, summary, plan)
+    if records:
+        _tables(console, summary, plan, records)
+    console.print(f"sweep: {summary['sweep_dir']}", soft_wrap=True)
+    console.print("[dim]results.csv, results.json: every point; summary.json: every metric[/]", soft_wrap=True)
+
+
+def _tables(console: Console, summary: Mapping[str, Any], plan: Plan, records: Sequence[Record]) -> None:
+    """By point, by cell or by metric, whichever says most in few rows; then the reasons."""
     single = len(records) <= MOST_ROWS and all(sum(cell["verdicts"].values()) == 1 for cell in summary["cells"])
     if summary["cells"] and single:
         console.print(_points(plan, records))
@@ -53,8 +61,6 @@ def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], cons
     _reasons(console, records)
     if seed_is_idle(plan, records):
         console.print("[yellow]note[/]  the seed changes nothing here: no noise in this scenario", soft_wrap=True)
-    console.print(f"sweep: {summary['sweep_dir']}", soft_wrap=True)
-    console.print("[dim]results.csv, results.json: every point; summary.json: every metric[/]", soft_wrap=True)
 
 
 def seed_is_idle(plan: Plan, records: Sequence[Record]) -> bool:
@@ -89,11 +95,12 @@ def _headline(console: Console, summary: Mapping[str, Any], plan: Plan) -> None:
 
 
 def _verdicts(summary: Mapping[str, Any], before: str = "", after: str = "") -> str:
-    """`passed 198   failed 2`, best first."""
+    """`passed 198   failed 2`, best first; an interruption before all of them."""
     ordered = sorted(summary["verdicts"].items(), key=lambda item: (item[0] != "passed", item[0]))
-    return "   ".join(
-        before.format(colour=COLOURS.get(verdict, "red")) + f"{verdict} {count}" + after for verdict, count in ordered
-    )
+    texts = [(verdict, f"{verdict} {count}") for verdict, count in ordered]
+    if summary["interrupted"]:
+        texts.insert(0, ("interrupted", "interrupted"))
+    return "   ".join(before.format(colour=COLOURS.get(verdict, "red")) + text + after for verdict, text in texts)
 
 
 def _metrics(metrics: Mapping[str, Any], errors: bool) -> Table:

@@ -15,12 +15,17 @@ from sil.campaign.records import Record
 from sil.scenario import load_scenario
 
 
-def shown(vary, records, draws=None):
+def shown(vary, records, draws=None, interrupted=False):
     plan = make_plan(
         load_scenario("mrac-rs232", ["board=inproc", "duration_s=5"]), conditions_from(None, vary, None, draws, 1)
     )
     records = records[: len(plan.points)]
-    summary = summarise(plan, records) | {"wall_s": 1.0, "workers": 2, "sweep_dir": "sweeps/x-001"}
+    summary = summarise(plan, records) | {
+        "interrupted": interrupted,
+        "wall_s": 1.0,
+        "workers": 2,
+        "sweep_dir": "sweeps/x-001",
+    }
     out = io.StringIO()
     table.show(summary, plan, records, Console(file=out, width=80, highlight=False, emoji=False))
     return out.getvalue()
@@ -60,3 +65,9 @@ def test_a_seed_that_decides_nothing_is_said():
     same = [flown(1, 0.1), flown(2, 0.1), flown(3, 0.2), flown(4, 0.2)]
     assert "the seed changes nothing here" in shown(vary, same)
     assert "the seed changes nothing here" not in shown(vary, [*same[:3], flown(4, 0.3)])
+
+
+def test_an_interruption_is_said_first_even_before_the_first_point():
+    assert shown(["seed=1:4"], [], interrupted=True).startswith("interrupted   mrac-rs232: 0 of 4 points")
+    text = shown(["seed=1:4"], [flown(1, 0.1)], interrupted=True)
+    assert text.startswith("interrupted   passed 1   mrac-rs232: 1 of 4 points")
