@@ -107,7 +107,7 @@ def notes(found: Sequence[Row]) -> Iterator[str]:
         starts = ", ".join(f"{row.label} {row.metrics['from_tick']}" for row in found)
         yield f"not from the same tick on: {starts}"
     if any(_best(found, column.metric, axis) is not None for column in COLUMNS for axis in range(3)):
-        yield "bold: the smallest among the runs that did not diverge"
+        yield "bold: the smallest among the runs that followed a set-point and did not diverge"
     if any(math.inf in (row.metrics["settling_s"] or ()) for row in found):
         yield "never: not within 2 % of the step (at least 0.1 deg) before the next one"
 
@@ -160,7 +160,8 @@ def _plain(value: Any) -> Any:
 
 def _best(found: Sequence[Row], metric: str, axis: int) -> float | None:
     """The smallest of an axis, where two or more were measured over the same time and are not all the same."""
-    calm = [row for row in found if row.metrics["diverged_at_s"] is None]
+    followed = [row for row in found if row.metrics["rms_error_deg"] is not None]
+    calm = [row for row in followed if row.metrics["diverged_at_s"] is None]
     if len({(row.duration_s, row.metrics["from_tick"]) for row in calm}) > 1:
         return None
     triples = [row.metrics[metric] for row in calm]
@@ -172,7 +173,8 @@ def _cells(row: Row, column: Column, best: Sequence[float | None]) -> Text:
     values = row.metrics[column.metric] or [None] * 3
     lines = []
     for value, smallest in zip(values, best, strict=True):
-        wins = value is not None and value == smallest and row.metrics["diverged_at_s"] is None
+        followed = row.metrics["diverged_at_s"] is None and row.metrics["rms_error_deg"] is not None
+        wins = followed and value is not None and value == smallest
         lines.append(Text(_number(value, column.factor), style="bold" if wins else ""))
     return Text("\n").join(lines)
 

@@ -13,7 +13,7 @@ import typer
 
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, UsageError
 from sil.verbs import completion
-from sil.verbs.options import JsonOption, SetOption, opened, print_json, scenario_from
+from sil.verbs.options import RESULT_PANEL, JsonOption, SetOption, opened, print_json, scenario_from
 
 if TYPE_CHECKING:
     from sil.runs import Run
@@ -33,10 +33,16 @@ def compare(
     ],
     set_: SetOption = None,
     keep: Annotated[
-        Path | None, typer.Option("--keep", metavar="DIR", help="Keep the runs that are made, in DIR/NAME-NNN.")
+        Path | None,
+        typer.Option(
+            "--keep", metavar="DIR", help="Keep the runs that are made, in DIR/NAME-NNN.", rich_help_panel=RESULT_PANEL
+        ),
     ] = None,
     as_json: JsonOption = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="A line per run on stdout, for spreadsheets.")] = False,
+    as_csv: Annotated[
+        bool,
+        typer.Option("--csv", help="A line per run on stdout, for spreadsheets.", rich_help_panel=RESULT_PANEL),
+    ] = False,
 ) -> int:
     """Compare runs or scenarios in one table: error, settling, effort, missed commands, verdict.
 
@@ -132,5 +138,5 @@ def _print(runs: list[Run], verdicts: dict[int, str], as_json: bool, as_csv: boo
 
         console = Console(highlight=False)
         console.print(report.table(found, console.width))
-        for line in report.notes(found):
-            console.print(line, style="dim", markup=False)
+        for i, line in enumerate(report.notes(found)):
+            console.print("\n" * (i == 0) + line, style="dim", markup=False)

@@ -51,6 +51,13 @@ def plot(
 ) -> int:
     """Draw a run, or several over each other: attitude against reference, error, torque, momentum, identification.
 
+    Several runs share the panels, roll, pitch and yaw in one each; the legend names them by what differs: scenario,
+    law, seed, a key of the scenario, or the directory. With --residuals each further run minus the first follows below,
+    at the instants both have: the common ticks, or where periods differ the times on both grids; nothing is
+    interpolated. A run that diverged is cut off by the panels of the others.
+
+    Exit codes: 0 written, 2 usage, not a run, or no such signal.
+
     Examples: sil plot runs/mrac-rs232-001 | sil plot A B --signals error,torque --residuals --out a-b.png
     """
     from sil.report.plot import default_out
