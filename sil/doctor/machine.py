@@ -14,7 +14,6 @@ from sil.doctor.findings import NOTE, OK, Finding, Surroundings, size_text, user
 
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
 GOOD_CLOCKS = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "riscv_clocksource")
-RUN_LOCKS_BYTES = 2 << 30  # what a run may map, compiler included; locking takes the whole of it
 TRIED_PRIORITY = 50
 LIMITS = "/etc/security/limits.d/attitude-sil.conf"
 Tries = Callable[[int], OSError | None]
@@ -174,18 +173,20 @@ def judge_real_time(around: Surroundings, limit: int, tries: Tries) -> Finding:
 
 
 def locked_memory(around: Surroundings) -> Finding:
-    """Whether `clock.lock_memory` would be granted."""
-    return judge_locked_memory(around, resource.getrlimit(resource.RLIMIT_MEMLOCK)[0])
+    """Whether `clock.lock_memory` would be granted: by the rule that a run goes by."""
+    from sil.realtime import may_lock_memory
+
+    return judge_locked_memory(around, resource.getrlimit(resource.RLIMIT_MEMLOCK)[0], may_lock_memory())
 
 
-def judge_locked_memory(around: Surroundings, limit: int) -> Finding:
-    """limit: RLIMIT_MEMLOCK in bytes."""
+def judge_locked_memory(around: Surroundings, limit: int, tried: bool) -> Finding:
+    """limit: RLIMIT_MEMLOCK in bytes. tried: whether a run would try at all; any limit may stop a later allocation."""
     unlimited, capable = limit == resource.RLIM_INFINITY, _capable(around, CAP_IPC_LOCK)
     named = "unlimited" if unlimited else size_text(limit)
     data = {"limit_bytes": None if unlimited else limit, "capability": capable}
-    if capable or unlimited or limit >= RUN_LOCKS_BYTES:
+    if tried and (capable or unlimited):
         return Finding(OK, f"may be locked ({'CAP_IPC_LOCK' if capable else f'RLIMIT_MEMLOCK {named}'})", data=data)
-    found = f"RLIMIT_MEMLOCK {named}, too little for a run: clock.lock_memory has no effect"
+    found = f"RLIMIT_MEMLOCK {named}: clock.lock_memory has no effect, for a run locks all of its memory or none"
     advice, commands = _permit(around, "memlock unlimited", "--ulimit memlock=-1")
     return Finding(NOTE, found, advice, commands, data=data)
 

@@ -181,12 +181,19 @@ def test_real_time_granted_says_by_what(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("limit", "capabilities", "status"),
-    [(8 << 20, "0", NOTE), (4 << 30, "0", OK), (resource.RLIM_INFINITY, "0", OK), (8 << 20, "4000", OK)],
+    ("limit", "capabilities", "tried", "status"),
+    [
+        (8 << 20, "0", False, NOTE),
+        (64 << 30, "0", False, NOTE),
+        (resource.RLIM_INFINITY, "0", True, OK),
+        (8 << 20, "4000", True, OK),
+        (8 << 20, "0", True, NOTE),
+    ],
 )
-def test_locked_memory(tmp_path: Path, limit: int, capabilities: str, status: str) -> None:
+def test_locked_memory(tmp_path: Path, limit: int, capabilities: str, tried: bool, status: str) -> None:
+    """A run locks all of its memory or none; root without the capability (a container) is told, too."""
     around = machine(tmp_path, {"/proc/self/status": f"CapEff:\t{capabilities}\n"})
-    found = checks.judge_locked_memory(around, limit)
+    found = checks.judge_locked_memory(around, limit, tried)
     assert found.status == status
     assert bool(found.commands) == (status == NOTE)
 
