@@ -106,7 +106,7 @@ def timers(around: Surroundings) -> Finding:
     """The kernel's clock source, and how far it may put off our wake-ups."""
     source = around.text("/sys/devices/system/clocksource/clocksource0/current_clocksource")
     others = around.text("/sys/devices/system/clocksource/clocksource0/available_clocksource").split()
-    slack = around.number("/proc/self/timerslack_ns")
+    slack = around.number("/proc/thread-self/timerslack_ns")
     data = {"clocksource": source, "available": others, "timerslack_ns": slack}
     said = f", timer slack {slack / 1000:g} us (realtime: 1 ns)" if slack is not None else ""
     found = f"clock source {source or 'not ours to see'}{said}"

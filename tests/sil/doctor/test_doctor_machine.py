@@ -138,7 +138,7 @@ def test_a_slow_clock_source_comes_with_the_command_for_a_better_one(tmp_path: P
 def test_timer_slack_is_told_in_microseconds(tmp_path: Path) -> None:
     folder = "/sys/devices/system/clocksource/clocksource0"
     found = checks.timers(
-        machine(tmp_path, {f"{folder}/current_clocksource": "tsc", "/proc/self/timerslack_ns": "50000"})
+        machine(tmp_path, {f"{folder}/current_clocksource": "tsc", "/proc/thread-self/timerslack_ns": "50000"})
     )
     assert (found.status, found.found) == (OK, "clock source tsc, timer slack 50 us (realtime: 1 ns)")
 
