@@ -247,7 +247,7 @@ def new_run_dir(name: str, out: Path | None) -> tuple[Path, bool]:
     """(`out`, made if it is not there and refused if it is not empty; or the next free runs/NAME-NNN; whether made)."""
     try:
         if out is None:
-            return _next_run_dir(Path("runs"), name), True
+            return next_run_dir(Path("runs"), name), True
         made = not out.exists()
         out.mkdir(parents=True, exist_ok=True)
         if any(out.iterdir()):
@@ -257,7 +257,8 @@ def new_run_dir(name: str, out: Path | None) -> tuple[Path, bool]:
     return out, made
 
 
-def _next_run_dir(parent: Path, name: str) -> Path:
+def next_run_dir(parent: Path, name: str) -> Path:
+    """Makes parent/NAME-NNN, the next free number. Raises OSError."""
     parent.mkdir(exist_ok=True)
     numbers = [
         int(p.name.removeprefix(f"{name}-")) for p in parent.glob(f"{name}-*") if p.name[len(name) + 1 :].isdigit()

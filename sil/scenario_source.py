@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
@@ -135,7 +135,15 @@ def _assign(overlay: Source, path: Path, value: Any, where: Where) -> None:
         overlay.where.setdefault(path[:depth], where)
         section = section[str(part)]
     section[str(path[-1])] = value
-    overlay.where = _without(overlay.where, path) | {path: where}
+    overlay.where = _without(overlay.where, path) | dict.fromkeys(_inside(value, path), where)
+
+
+def _inside(value: Any, path: Path) -> Iterator[Path]:
+    """`path` and, where its value is a section, the paths of all keys in it."""
+    yield path
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from _inside(item, (*path, str(key)))
 
 
 def _replaced(data: Any, path: Path, value: Any, whole: Path) -> Any:

@@ -19,7 +19,7 @@ from sil.campaign.plan import Point, make_plan, sets_of
 from sil.campaign.pool import Order, Pool
 from sil.campaign.records import Record, refused
 from sil.campaign.results import RUNS, Results
-from sil.runner import _next_run_dir, new_run_dir
+from sil.runner import new_run_dir, next_run_dir
 from sil.scenario import Scenario, load_values
 from sil.stopping import StopRequests
 from sil.trouble import EXIT_INTERRUPTED, UsageError
@@ -50,7 +50,7 @@ class SweepWatch:
 def new_sweep(scenario: Scenario, conditions: Conditions, out: Path | None, watch: SweepWatch | None = None) -> Results:
     """Plan a sweep and write the plan; raises UsageError before anything is written. out: None: sweeps/NAME-NNN."""
     plan = make_plan(scenario, conditions, (watch or SweepWatch()).planning)
-    directory = new_run_dir(plan.name, out)[0] if out is not None else _next_run_dir(Path("sweeps"), plan.name)
+    directory = new_run_dir(plan.name, out)[0] if out is not None else next_run_dir(Path("sweeps"), plan.name)
     opened = results.create(directory, plan)
     for point in plan.points:
         if point.refused:

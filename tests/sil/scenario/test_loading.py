@@ -188,3 +188,11 @@ def test_the_json_schema_knows_every_key() -> None:
     assert set(schema["properties"]) == {*Scenario.model_fields, "extends"}
     assert schema["additionalProperties"] is False
     assert json.dumps(schema)
+
+
+def test_a_whole_section_by_set_owns_the_keys_inside() -> None:
+    """A law file named so is looked for in the working directory, not beside the scenario that named another law."""
+    scenario = load_scenario("appc-rs232", ["law={name: pd, form: float}"])
+    assert str(scenario.where("law.name")).startswith("--set law")
+    with pytest.raises(ScenarioInvalid, match="^--set law: law.form: "):
+        load_scenario("appc-rs232", ["law={name: pd, form: octal}"])
