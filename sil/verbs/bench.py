@@ -18,8 +18,12 @@ def bench(
             help="codec, recorder, law, plant, loop, lockstep, wakeup, fast. Default: all of them.",
         ),
     ] = None,
-    repeats: Annotated[int, typer.Option("--repeats", min=1, max=1000, help="Interleaved repeats of each figure.")] = 5,
-    quick: Annotated[bool, typer.Option("--quick", help="Short ones: to see that all of it works here.")] = False,
+    repeats: Annotated[
+        int | None, typer.Option("--repeats", min=1, max=1000, help="Interleaved repeats; default 5, quick 2.")
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Short ones, in about three minutes: to see that all of it works here.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> int:
     """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
@@ -28,7 +32,7 @@ def bench(
     small C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the
     least that anybody would have to do.
 
-    All of it takes about 25 minutes; Ctrl-C prints what is finished. Close other programs first: the machine's load is
+    All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load is
     in the table. The exit code says nothing about goals.
 
     Examples: sil bench --quick | sil bench lockstep plant | sil bench wakeup --repeats 5 --json
@@ -38,13 +42,14 @@ def bench(
     from sil.bench.series import run_series
     from sil.bench.shown import Progress, show
 
-    progress, plan, facts = Progress(), Plan(repeats, quick), machine.facts()
+    plan = Plan(repeats or (2 if quick else 5), quick)
+    progress, facts = Progress(), machine.facts()
     try:
         books, interrupted = run_series(names or (), plan, progress)
     finally:
         progress.close()
     if as_json:
-        head = {"machine": facts, "repeats": repeats, "quick": quick, "interrupted": interrupted}
+        head = {"machine": facts, "repeats": plan.repeats, "quick": quick, "interrupted": interrupted}
         print_json({**head, "benches": {book.name: book.plain() for book in books}})
     else:
         show(books, facts, interrupted)
