@@ -153,7 +153,7 @@ def board(
     Writes its address on stdout, what goes wrong on stderr. Same as python -m firmware_sim.
 
     Exit codes: 0 Ctrl-C, SIGTERM, or the end of the first session with --once; 2 usage; 3 the link cannot be opened, or
-    failed.
+    failed; 4 the law raised an exception.
 
     Examples: sil board --link udp://127.0.0.1:5005 | sil board --link serial:///dev/ttyUSB0 --once |
     sil board --link udp://0.0.0.0:5005 --law ./my_law.py:MyLaw

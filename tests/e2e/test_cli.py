@@ -5,15 +5,20 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
+import re
+from pathlib import Path
 
 import pytest
+
+from sil.cli import VERBS as PANELS
 
 COLUMNS = [
     *("tick", "t_s", "phi_deg", "theta_deg", "psi_deg", "ref_phi_deg", "ref_theta_deg", "ref_psi_deg"),
     *("command_x_Nm", "command_y_Nm", "command_z_Nm", "applied_x_Nm", "applied_y_Nm", "applied_z_Nm"),
     *("w_x_radps", "w_y_radps", "w_z_radps", "h_x_Nms", "h_y_Nms", "h_z_Nms", "q_s", "q_x", "q_y", "q_z"),
 ]
-VERBS = ("run", "plant", "board", "replay", "diff", "info", "plot", "export", "check", "scenarios", "recover")
+VERBS = [verb.__name__ for verbs in PANELS.values() for verb in verbs]
 SHORT = ("appc-rs232", "--set", "duration_s=30", "--set", "require=[]")
 
 
@@ -153,8 +158,64 @@ def test_recover(cli, recorded):
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_help(cli, verb):
+    """What it is, how to call it, and an example that can be copied."""
     out, _ = cli(verb, "--help")
     assert "Usage" in out
+    assert f"\n   sil {verb}" in out or verb in ("info", "export")  # whose usage line says it all
+
+
+@pytest.mark.parametrize("verb", ["run", "plant", "board", "replay", "recover", "check", "scenarios", "schema"])
+def test_help_says_which_exit_codes_can_occur(cli, verb):
+    out, _ = cli(verb, "--help")
+    assert re.search(r"Exit codes *\n +0  \S", out)
+
+
+def test_help_fits_a_narrow_terminal_and_has_no_colours_where_nobody_wants_them(cli):
+    for verb in ("run", "replay"):
+        process = cli.start(verb, "-h", env={**os.environ, "COLUMNS": "60", "NO_COLOR": "1"})
+        out, _ = process.communicate(timeout=60)
+        assert max(map(len, out.splitlines())) <= 60
+        assert "\x1b" not in out
+
+
+def test_version(cli):
+    out, _ = cli("--version")
+    assert re.fullmatch(r"sil [0-9.]+, layout of the frames [0-9a-f]{8}, Python 3\.[0-9.]+\n", out)
+
+
+def test_quiet_is_the_verdict_in_one_line(cli):
+    out, err = cli("run", *SHORT, "--link", "inproc", "-q")
+    assert (len(out.splitlines()), err) == (1, "")
+    assert "passed" in out
+    assert "appc-rs232-001" in out
+    out, err = cli("run", *SHORT, "--link", "inproc", "-q", "-v", code=2)
+    assert (out, err) == ("", "-q, -v: expected one of them, got both\n")
+
+
+def test_verbose_says_what_was_plugged_together(cli):
+    _, err = cli("run", *SHORT, "--link", "inproc", "--verbose")
+    assert "session: law appc" in err
+
+
+def test_priority_and_cpus_are_short_for_keys_of_the_clock(cli, monkeypatch):
+    from sil.verbs import run
+
+    asked = []
+    monkeypatch.setattr(run, "_run", lambda name, load, told, wired: asked.append(load().clock) or 0)
+    run.run("appc-rs232", priority=50, cpus="0,1", clock="realtime", set_=["clock.priority=3", "clock.lab_cpu=7"])
+    run.plant("appc-rs232", cpus=",1")
+    found = [(clock.mode, clock.priority, clock.lab_cpu, clock.board_cpu) for clock in asked]
+    assert found == [("realtime", 50, 0, 1), ("lockstep", None, None, 1)]
+
+
+def test_the_schema_is_printed_and_found(cli):
+    out, _ = cli("schema")
+    assert json.loads(out)["title"] == "sil scenario"
+    path, _ = cli("schema", "--path")
+    assert Path(path.strip()).read_text(encoding="utf-8") == out
+    checked, _ = cli("check", "mrac-rs232")
+    assert checked.splitlines()[1].endswith(f"# yaml-language-server: $schema={path.strip()}")
+    assert cli.json("check", "mrac-rs232")["schema"] == path.strip()
 
 
 # -- bad input: one line, the exit code of DESIGN's table, nothing lost ------------------------------------------------
@@ -181,6 +242,9 @@ def test_every_verb_has_help(cli, verb):
         (("plant", "appc-udp", "--link", "inproc"), 2, "got 'inproc'"),
         (("run", "appc-rs232", "--set", "name=../../evil"), 2, "a name of letters"),
         (("run", "appc-rs232", "--clock", "scaled:0.001"), 2, "N from 0.01 to 1000"),
+        (("run", "appc-rs232", "--cpus", "0-1"), 2, "--cpus: expected LAB,BOARD"),
+        (("run", "appc-rs232", "--cpus", "0,1,2"), 2, "--cpus: expected LAB,BOARD"),
+        (("run", "appc-rs232", "--priority", "100"), 2, "--priority"),
     ],
 )
 def test_bad_input_is_one_clear_line(cli, arguments, code, says):
