@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gzip
 import os
 import re
@@ -12,6 +13,7 @@ from collections.abc import Callable
 
 from sil.doctor.findings import NOTE, OK, Finding, Surroundings, size_text, user_name
 
+PR_GET_TIMERSLACK = 30
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
 GOOD_CLOCKS = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "riscv_clocksource")
 TRIED_PRIORITY = 50
@@ -104,11 +106,15 @@ def _built_with(around: Surroundings, version: str) -> str:
 
 def timers(around: Surroundings) -> Finding:
     """The kernel's clock source, and how far it may put off our wake-ups."""
+    return judge_timers(around, ctypes.CDLL(None).prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0))
+
+
+def judge_timers(around: Surroundings, slack: int) -> Finding:
+    """slack: of this thread, ns; the kernel's file of it is for others, and asks for a capability."""
     source = around.text("/sys/devices/system/clocksource/clocksource0/current_clocksource")
     others = around.text("/sys/devices/system/clocksource/clocksource0/available_clocksource").split()
-    slack = around.number("/proc/thread-self/timerslack_ns")
     data = {"clocksource": source, "available": others, "timerslack_ns": slack}
-    said = f", timer slack {slack / 1000:g} us (realtime: 1 ns)" if slack is not None else ""
+    said = f", timer slack {slack / 1000:g} us (realtime: 1 ns)" if slack > 0 else ""
     found = f"clock source {source or 'not ours to see'}{said}"
     if source and source not in GOOD_CLOCKS:
         better = next((name for name in GOOD_CLOCKS if name in others), "")
