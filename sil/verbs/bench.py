@@ -14,7 +14,7 @@ def bench(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="[NAMES]...",
+            metavar="NAMES",
             help="codec, recorder, law, plant, loop, lockstep, wakeup, fast. Default: all of them.",
         ),
     ] = None,
@@ -32,8 +32,8 @@ def bench(
     small C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the
     least that anybody would have to do.
 
-    All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load is
-    in the table. The exit code says nothing about goals.
+    All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load
+    is in the table. The exit code says nothing about goals.
 
     Examples: sil bench --quick | sil bench lockstep plant | sil bench wakeup --repeats 5 --json
     """
