@@ -252,4 +252,5 @@ SILENT_UDP = (
     "1. the board runs and listens on this address and port, not on loopback only (udp://0.0.0.0:PORT)",
     "2. no firewall between: sudo nft list ruleset, at both ends",
     "3. the host is there: ping it",
+    "4. no other laboratory is in a session with it: a board answers one at a time",
 )
