@@ -55,9 +55,13 @@ def compare(
 
     Examples: sil compare runs/mrac-rs232-001 runs/mrac-rs232-002 | sil compare appc-rs232 mrac-rs232 pd-root-locus
     """
+    from sil.runs import Run
+
     if as_json and as_csv:
         raise UsageError("--json, --csv: expected one of them, got both")
     sources = [_source(name, set_) for name in names]
+    if set_ and all(isinstance(source, Run) for source in sources):
+        raise UsageError("--set: expected a scenario among the names, got only runs, which are what they are")
     with _folder(keep) as parent:
         runs, verdicts, code = _collected(sources, parent)
         if runs:

@@ -159,3 +159,9 @@ def test_an_interrupted_comparison_shows_what_is_complete(
     arguments = ["compare", str(runs[0].directory), "pd-root-locus", str(runs[1].directory), "--json"]
     assert cli.invoke(arguments) == 130
     assert [row["label"] for row in json.loads(capsys.readouterr().out)["runs"]] == ["synthetic"]
+
+
+def test_overrides_without_a_scenario_are_refused(runs: list[Run], capsys: pytest.CaptureFixture[str]) -> None:
+    """A directory with the name of a built-in scenario is a run: --set would silently change nothing."""
+    assert cli.invoke(["compare", str(runs[0].directory), "--set", "seed=2"]) == 2
+    assert "expected a scenario among the names" in capsys.readouterr().err
