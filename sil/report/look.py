@@ -6,6 +6,7 @@ Lengths are in inches, text in points.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -35,6 +36,11 @@ class Look(NamedTuple):
     axes: tuple[str, str, str]
     over: tuple[str, str, str]
     runs: tuple[str, ...]
+    span_s: tuple[float, float] = (-math.inf, math.inf)  # the part of the time that is drawn
+
+    def window(self, first_s: float, last_s: float) -> tuple[float, float]:
+        """Limits of a time axis for data from first_s to last_s."""
+        return max(first_s, self.span_s[0]), min(last_s, self.span_s[1])
 
 
 LIGHT = Look(
@@ -108,7 +114,13 @@ def legend(ax: Axes, handles: Sequence[Line2D], look: Look) -> None:
 
 
 def line(ax: Axes, t: Array, values: Array, step: bool = False, **style: Any) -> None:
-    """One line; beyond _POINTS_MAX points the smallest and largest of each bin, so that no peak is lost."""
+    """One line within the limits of the time axis, which stand already, so that the other axis fits what is seen.
+
+    Beyond _POINTS_MAX points the smallest and largest of each bin are drawn, so that no peak is lost.
+    """
+    first, last = np.searchsorted(t, ax.get_xlim())
+    seen = slice(max(int(first) - 1, 0), int(last) + 1)
+    t, values = t[seen], values[seen]
     if len(t) > _POINTS_MAX:
         t, values = _thinned(t, values)
     ax.plot(t, values, drawstyle="steps-post" if step else "default", solid_joinstyle="round", **style)

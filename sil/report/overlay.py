@@ -26,7 +26,7 @@ from sil.runs import Array, Run, wrapped_deg
 ATTITUDE = "attitude"
 _STYLES = ("-", DASHED, DOTTED)
 _ROW_in, _GRID_ROW_in, _FOOT_in = 2.5, 2.05, 0.6
-_LEFT, _RIGHT = 0.09, 0.98
+_LEFT, _RIGHT = 0.09, 0.975
 _CHARACTER_in, _KEY_in, _KEY_ROW_in = 0.077, 0.62, 0.22  # of a legend's entry at 10 points
 
 
@@ -138,6 +138,10 @@ class _Page:
 
     def __init__(self, ensemble: Ensemble, what: str, panels_in: float, residuals: bool, attitude: bool) -> None:
         self.ensemble, self.look = ensemble, ensemble.look
+        starts, ends = zip(
+            *((float(run.t_s[0]), float(run.t_s[-1]) + run.period_s) for run in ensemble.runs), strict=True
+        )
+        self.window = ensemble.look.window(min(starts), max(ends))
         keys = [*ensemble.keys(), *(_guides(ensemble) if attitude else ())]
         per_row, key_rows = _legend_rows([str(key.get_label()) for key in keys])
         notes = [facts(ensemble.runs), *([_residual_note(ensemble)] if residuals else [])]
@@ -160,6 +164,7 @@ class _Page:
         """One axis of a signal, all runs; the factor of the unit is the row's."""
         everything = np.concatenate([curve.values.ravel() for curve in _calm(curves)])
         factor, unit = scaled(everything, signal.unit)
+        ax.set_xlim(self.window)
         if not is_residual:
             self._guide(ax, signal, column)
         for curve in curves:
@@ -184,10 +189,7 @@ class _Page:
 
     def finish(self, lowest: set[Axes]) -> None:
         """Numbers under the lowest panel of each column, the time axis' name at the foot of the page."""
-        runs = self.ensemble.runs
-        ends = [float(run.t_s[-1]) + run.period_s for run in runs]
         for ax in self.figure.axes:
-            ax.set_xlim(min(float(run.t_s[0]) for run in runs), max(ends))
             ax.tick_params(labelbottom=ax in lowest)
             if ax in lowest and ax.get_position().y0 < self.place["bottom"] + 1e-6:
                 ax.set_xlabel("time in s", fontsize=11, color=self.look.ink)
@@ -242,7 +244,9 @@ def _hold_range(ax: Axes, curves: Sequence[Curve], column: int, factor: float) -
     calm = _calm(curves)
     if len(calm) == len(curves):
         return
-    values = np.concatenate([curve.values[:, min(column, curve.values.shape[1] - 1)] for curve in calm]) * factor
+    first, last = ax.get_xlim()
+    seen = [curve.values[(first <= curve.t_s) & (curve.t_s <= last)] for curve in calm]
+    values = np.concatenate([part[:, min(column, part.shape[1] - 1)] for part in seen]) * factor
     values = values[np.isfinite(values)]
     if values.size and values.max() > values.min():
         room = 0.3 * (values.max() - values.min())

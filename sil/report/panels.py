@@ -163,7 +163,7 @@ def _page(run: Run, what: str, panels: int, look: Look) -> tuple[Figure, list[Ax
     figure.subplots_adjust(left=_LEFT, right=0.855, top=top, bottom=bottom, hspace=0.25)
     looks.headed(figure, f"{run.name} — {what}" if what else run.name, facts([run]), _LEFT, look)
     axes[-1].set_xlabel("time in s", fontsize=11, color=look.ink)
-    axes[-1].set_xlim(float(run.t_s[0]), float(run.t_s[-1]) + run.period_s)
+    axes[-1].set_xlim(look.window(float(run.t_s[0]), float(run.t_s[-1]) + run.period_s))
     for ax in axes:
         ax.autoscale(enable=False, axis="x")
     return figure, list(axes)

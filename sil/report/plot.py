@@ -5,6 +5,7 @@ A page is 12 inches wide: 1200 pixels as PNG. Signals are those of sil.report.si
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -35,13 +36,19 @@ class Page(NamedTuple):
 
 
 def plot(
-    runs: Sequence[Run], out: Path, signals: Sequence[str] = (), residuals: bool = False, dark: bool = False
+    runs: Sequence[Run],
+    out: Path,
+    signals: Sequence[str] = (),
+    residuals: bool = False,
+    dark: bool = False,
+    span_s: tuple[float, float] = (-math.inf, math.inf),
 ) -> list[Path]:
     """Write pictures. `out` *.pdf: all pages in one file; *.png: the overview; a directory: every page as a PNG.
 
     runs: one, or several that are drawn over each other. signals: names to show instead of the usual ones. residuals:
-    what each further run differs by from the first. Returns the files written. Raises PlotError for other suffixes, an
-    empty run, or a place that cannot be written, and SignalError for signals that are not there.
+    what each further run differs by from the first. span_s: the part of the time to draw. Returns the files written.
+    Raises PlotError for other suffixes, an empty run, a span without ticks, or a place that cannot be written, and
+    SignalError for signals that are not there.
     """
     for run in runs:
         if not len(run):
@@ -50,7 +57,11 @@ def plot(
         raise PlotError("--residuals: expected two runs or more, got one")
     if out.suffix and out.suffix not in FORMATS:
         raise PlotError(f"{out}: expected one of {', '.join(FORMATS)} or a directory, got {out.suffix}")
-    made = pages(runs, signals, residuals, DARK if dark else LIGHT, whole=out.suffix != ".png")
+    look = (DARK if dark else LIGHT)._replace(span_s=span_s)
+    begin, end = look.window(min(run.t_s[0] for run in runs), max(run.t_s[-1] for run in runs))
+    if not begin < end:
+        raise PlotError(f"--time: expected a part of the runs, got {span_s[0]:g}:{span_s[1]:g} s")
+    made = pages(runs, signals, residuals, look, whole=out.suffix != ".png")
     try:
         if out.suffix == ".pdf":
             return [_write_pdf(out, made)]

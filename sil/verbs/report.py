@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from sil.trouble import EXIT_OK, EXIT_REQUIREMENT
+from sil.trouble import EXIT_OK, EXIT_REQUIREMENT, UsageError
 from sil.verbs.options import JsonOption, RunArgument, opened, print_json
 
 
@@ -39,6 +40,9 @@ def plot(
     residuals: Annotated[
         bool, typer.Option("--residuals", help="Several runs: also the difference of each to the first.")
     ] = False,
+    time: Annotated[
+        str | None, typer.Option("--time", metavar="FROM:TO", help="The part to draw, s; 100: is from 100 s on.")
+    ] = None,
     dark: Annotated[bool, typer.Option("--dark", help="For dark pages and slides.")] = False,
     out: Annotated[
         Path | None,
@@ -66,9 +70,21 @@ def plot(
     runs = [opened(path) for path in run_dirs]
     names = [name.strip() for each in signals or () for name in each.split(",") if name.strip()]
     target = out or default_out(runs)
-    draw(runs, target, names, residuals, dark)
+    draw(runs, target, names, residuals, dark, _span_s(time))
     print(target)
     return EXIT_OK
+
+
+def _span_s(text: str | None) -> tuple[float, float]:
+    """FROM:TO in s; either may be missing."""
+    begin, colon, end = (text or ":").partition(":")
+    try:
+        span = float(begin or "-inf"), float(end or "inf")
+    except ValueError:
+        span = math.nan, math.nan
+    if not colon or not span[0] < span[1]:
+        raise UsageError(f"--time: expected FROM:TO in s, such as 100:200 or 100:, got {text!r}")
+    return span
 
 
 def export(

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 from synthetic import synthetic_journal
 
+from sil import cli
 from sil.report.facts import facts, labels
 from sil.report.look import DARK, LIGHT
 from sil.report.overlay import Ensemble, common
@@ -213,3 +214,26 @@ def test_facts_are_what_the_runs_share(runs: tuple[Run, Run]) -> None:
         ["law pd", "sampling 0.5 s", "transport delay 1 tick", "200 ticks", "finished"]
     )
     assert "law" not in facts([runs[0], named(runs[0], law__form="float")])
+
+
+# -- a part of the time ------------------------------------------------------------------------------------------------
+
+
+def test_a_part_of_the_time_is_drawn_at_its_own_scale(runs: tuple[Run, Run], tmp_path: Path) -> None:
+    """Around 60 s the pitch error is far below its peak at the step of 20 s; hidden data must not set the scale."""
+    look = LIGHT._replace(span_s=(60.0, 70.0))
+    for many, axes in ((runs, 3), (runs[:1], 1)):
+        whole, part = (pages(many, ["error"], look=each)[0].figure.axes[:axes] for each in (LIGHT, look))
+        assert part[0].get_xlim() == (60.0, 70.0)
+        for wide, narrow in zip(whole, part, strict=True):
+            assert np.ptp(narrow.get_ylim()) < 0.5 * np.ptp(wide.get_ylim())
+    with pytest.raises(PlotError, match="--time: expected a part of the runs, got 1000:inf s"):
+        plot(runs, tmp_path / "a.png", span_s=(1000.0, np.inf))
+
+
+@pytest.mark.parametrize(("given", "code"), [("60:70", 0), (":70", 0), ("60:", 0), ("60", 2), ("70:60", 2), ("a:b", 2)])
+def test_the_part_is_read_as_from_to(runs: tuple[Run, Run], tmp_path: Path, given: str, code: int) -> None:
+    out = tmp_path / "a.png"
+    arguments = ["plot", str(runs[0].directory), "--time", given, "--signals", "rate,error", "--out", str(out)]
+    assert cli.invoke(arguments) == code
+    assert out.exists() == (code == 0)
