@@ -16,6 +16,7 @@ from protocol.frames import BadPacket, Frame, Hello, Packet, Ready, Stop, Tick, 
 from protocol.link import Link
 
 Tap = Callable[[str, bytes], object]
+FRUITLESS_READS = 64  # of garbage in a row, once the time is over; what is behind it is for the next receive
 HOUSEKEEPING_FRAMES = frozenset((Hello, Ready, Tick, Timing, Stop))
 
 
@@ -82,7 +83,7 @@ class Port:
         ready = self._ready
         if ready:
             return ready.popleft()
-        deadline = time.monotonic() + timeout_s if timeout_s else 0.0
+        deadline, fruitless = time.monotonic() + timeout_s if timeout_s else 0.0, 0
         while True:
             data = self.link.receive(timeout_s)
             if not data:
@@ -91,8 +92,10 @@ class Port:
                 self._take(raw)
             if ready:
                 return ready.popleft()
-            if timeout_s:  # bytes, but no frame: wait on for what is left of the time
-                timeout_s = max(0.0, deadline - time.monotonic())
+            if timeout_s is not None:  # bytes, but no frame: wait on for what is left of the time
+                timeout_s, fruitless = max(0.0, deadline - time.monotonic()), fruitless + 1
+                if not timeout_s and fruitless > FRUITLESS_READS:
+                    return None  # whoever floods us with garbage does not keep us
 
     def _take(self, raw: bytes) -> None:
         """One packet with a right CRC: count, check its number, queue it."""

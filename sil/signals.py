@@ -92,7 +92,7 @@ class Recorder(Protocol):
         """The plant at t_k and the torque that acts from t_k on."""
 
     def timing(self, tick: int, wake: Wake, answer_ns: int) -> None:
-        """How late the tick woke up on the wall clock and why, and how long the board took to answer (-1: no answer)."""
+        """How late the tick woke up on the wall clock and why; how long the board took to answer (-1: no answer)."""
 
     def commit(self, tick: int) -> None:
         """Everything of this tick has been handed over: one write."""

@@ -12,7 +12,6 @@ from sil.signals import Motion, Vector
 from sil.sinks import journal
 from sil.sinks.journal import Journal, Kind
 
-
 OnEvent = Callable[[int, int, int, int, int], None]  # tick, code, a, b, origin
 TYPE_AT = 1  # of a packet
 

