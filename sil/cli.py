@@ -14,7 +14,7 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import bench, compare, doctor, replay, report, run, scenario, sweep
+from sil.verbs import bench, compare, completion, doctor, replay, report, run, scenario, sweep
 from sil.verbs.manual import exit_codes, page_of
 
 app = typer.Typer(
@@ -72,7 +72,8 @@ for _panel, _verbs in VERBS.items():
 def main(argv: list[str] | None = None) -> None:
     """Entry point: maps every expected failure to one line on stderr and its exit code."""
     streams.settle()
-    sys.exit(invoke(argv))
+    with completion.whole_words():
+        sys.exit(invoke(argv))
 
 
 def invoke(argv: list[str] | None = None) -> int:

@@ -7,7 +7,10 @@ a list is empty, the shell completes file names. Values that may follow KEY= com
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +18,8 @@ import typer
 
 Offer = tuple[str, str]  # a word and what it means, which zsh and fish show
 MOST_FILES = 200
+WORD_BREAKS = "=:"  # where bash ends a word
+PLAIN = str.maketrans("[]'", "()’", '`"$')
 LONGEST = 70  # characters of what a word means
 DEVICES = ("/dev/serial/by-id/*", "/dev/ttyUSB*", "/dev/ttyACM*", "/dev/ttyAMA*")
 CLOCKS = (
@@ -74,6 +79,54 @@ def sets(ctx: typer.Context, incomplete: str) -> list[Offer]:
         inside = only
     found = ((f"{name}=" if name in keys else name, _about(keys.get(name, {}))) for name in sorted(sections))
     return _fitting(found, incomplete)
+
+
+# -- bash ----------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def whole_words() -> Iterator[None]:
+    """Inside, words that bash took apart at = and : are one again; what is printed is what bash has to put behind them.
+
+    For bash, `--set law.form=fl` is the words law.form, = and fl, and it replaces the last one only.
+    """
+    words = os.environ.get("COMP_WORDS", "").split("\n")
+    index = os.environ.get("COMP_CWORD", "")
+    if os.environ.get("_SIL_COMPLETE") != "complete_bash" or not index.isdecimal() or int(index) >= len(words):
+        yield
+        return
+    joined = rejoined(words[: int(index) + 1])
+    os.environ |= {"COMP_WORDS": "\n".join(joined), "COMP_CWORD": str(len(joined) - 1)}
+    printed = StringIO()
+    try:
+        with redirect_stdout(printed):
+            yield
+    finally:
+        for line in printed.getvalue().splitlines():
+            print(behind(joined[-1], line))
+
+
+def rejoined(words: list[str]) -> list[str]:
+    """`["a", "=", "b"]` as `["a=b"]`; the last word is the one that is being typed."""
+    joined: list[str] = []
+    open_end = False
+    for word in words:
+        is_break = bool(word) and not word.strip(WORD_BREAKS)
+        if joined and (is_break or open_end):
+            joined[-1] += word
+        else:
+            joined.append(word)
+        open_end = is_break
+    return joined
+
+
+def behind(typed: str, offer: str) -> str:
+    """The part of `offer` behind the last = or : of what is typed; typed `--clock=l`, an offer is the value alone."""
+    fixed = typed[: 1 + max(map(typed.rfind, WORD_BREAKS))]
+    for before in (fixed, fixed.partition("=")[2]):
+        if before and offer.startswith(before):
+            return offer.removeprefix(before)
+    return offer
 
 
 # -- the schema ----------------------------------------------------------------------------------------------------
@@ -143,7 +196,7 @@ def _about(schema: dict[str, Any]) -> str:
 
 def _short(about: str) -> str:
     """One line without what a shell or rich would take for markup; longer ones are broken, which zsh cannot show."""
-    plain = about.translate(str.maketrans({"[": "(", "]": ")", "'": "’", "`": None, '"': None, "$": None}))
+    plain = about.translate(PLAIN)
     return plain if len(plain) <= LONGEST else plain[: LONGEST - 3] + "..."
 
 

@@ -6,6 +6,7 @@ The shells' part is typer's; here its protocol is spoken as their scripts speak 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from sil.scenario import load_scenario
 from sil.scenarios import list_scenarios
@@ -135,16 +138,39 @@ def test_a_meaning_is_one_line_for_zsh(tmp_path: Path) -> None:
     assert len(printed.strip().splitlines()) == len(list_scenarios())
 
 
+@given(st.lists(st.text("ab=:.", min_size=1, max_size=9), min_size=1))
+def test_bashs_pieces_are_words_again(line: list[str]) -> None:
+    """As bash takes them apart: at every run of = or :; a word that begins with one is lost in the word before."""
+    line = [word if word.strip("=:")[:1] == word[:1] else f"a{word}" for word in line]
+    whole = [line[0]]
+    for word in line[1:]:  # a run at the end of a word, or at its start, glues the next one to it
+        whole = [*whole[:-1], whole[-1] + word] if whole[-1][-1] in "=:" else [*whole, word]
+    assert completion.rejoined([piece for word in line for piece in re.findall(r"[=:]+|[^=:]+", word)]) == whole
+
+
+@pytest.mark.parametrize(
+    ("typed", "offer", "rest"),
+    [("law.form=fl", "law.form=float", "float"), ("law.form=", "law.form=fixed", "fixed"),
+     ("udp:", "udp://h:5", "//h:5"), ("scaled:2", "scaled:20", "20"), ("--clock=l", "lockstep", "lockstep"),
+     ("mrac", "mrac-rs232", "mrac-rs232"),
+     ("--link=udp:/", "udp://h:5", "//h:5")],
+)  # fmt: skip
+def test_bash_gets_what_it_puts_behind_the_last_break(typed: str, offer: str, rest: str) -> None:
+    assert completion.behind(typed, offer) == rest
+
+
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
 def test_bash_completes(tmp_path: Path) -> None:
     """The script that --show-completion prints, in bash itself; `; true` keeps bash the parent that typer looks for."""
     script = """eval "$(bash -c 'sil --show-completion; true')"
-        COMP_WORDS=(sil run pd); COMP_CWORD=2; _sil_completion sil; echo "${COMPREPLY[@]}" """
+        COMP_WORDS=(sil run pd); COMP_CWORD=2; _sil_completion sil; echo "${COMPREPLY[@]}"
+        COMP_WORDS=(sil run x --set law.form = fl); COMP_CWORD=6; _sil_completion sil; echo "${COMPREPLY[@]}"
+        COMP_WORDS=(sil run x --clock scaled :); COMP_CWORD=5; _sil_completion sil; echo "${COMPREPLY[@]}" """
     environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ['PATH']}"}
     done = subprocess.run(
         ["bash", "-c", script], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60
     )
-    assert done.stdout == "pd-root-locus\n"
+    assert done.stdout == "pd-root-locus\nfloat\n20\n"
 
 
 @pytest.mark.parametrize(
