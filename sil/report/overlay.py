@@ -26,6 +26,7 @@ from sil.runs import Array, Run, wrapped_deg
 ATTITUDE = "attitude"
 _STYLES = ("-", DASHED, DOTTED)
 _ROW_in, _GRID_ROW_in, _FOOT_in = 2.5, 2.05, 0.6
+_LONG_S = 10_000.0
 _LEFT, _RIGHT = 0.09, 0.975
 _CHARACTER_in, _KEY_in, _KEY_ROW_in = 0.077, 0.62, 0.22  # of a legend's entry at 10 points
 
@@ -190,6 +191,8 @@ class _Page:
     def finish(self, lowest: set[Axes]) -> None:
         """Numbers under the lowest panel of each column, the time axis' name at the foot of the page."""
         for ax in self.figure.axes:
+            if self.window[1] >= _LONG_S and ax.get_position().width < 0.5:
+                ax.locator_params(axis="x", nbins=4)  # wide numbers under a narrow panel
             ax.tick_params(labelbottom=ax in lowest)
             if ax in lowest and ax.get_position().y0 < self.place["bottom"] + 1e-6:
                 ax.set_xlabel("time in s", fontsize=11, color=self.look.ink)

@@ -22,13 +22,17 @@ if TYPE_CHECKING:
 _YAML = (".yaml", ".yml")
 
 
+def _offers(incomplete: str) -> list[tuple[str, str]]:
+    return [*completion.scenarios(incomplete), *completion.runs(incomplete)]
+
+
 def compare(
     names: Annotated[
         list[str],
         typer.Argument(
             metavar="RUN_OR_SCENARIO...",
             help="Run directories or .mcap files; names of scenarios or YAML files, which are run first.",
-            autocompletion=completion.scenarios,
+            autocompletion=_offers,
         ),
     ],
     set_: SetOption = None,

@@ -9,11 +9,20 @@ from typing import Annotated
 import typer
 
 from sil.trouble import EXIT_OK, EXIT_REQUIREMENT, UsageError
+from sil.verbs import completion
 from sil.verbs.options import JsonOption, RunArgument, opened, print_json
 
 
 def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
-    """What a run was: scenario, law, versions, hashes, verdict, events."""
+    """What a run was: scenario, law, versions, hashes, verdict, metrics, frames, events.
+
+    Everything from the log, but the verdict, which stands in summary.json beside it, and the machine's facts, in
+    timing.mcap. A metric that does not exist is a dash.
+
+    Exit codes: 0 shown, 2 not a run.
+
+    Examples: sil info runs/mrac-rs232-001 | sil info runs/mrac-rs232-001 --json
+    """
     from sil.report import info as about
 
     content = about.info(opened(run_dir))
@@ -26,7 +35,12 @@ def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
 
 def plot(
     run_dirs: Annotated[
-        list[Path], typer.Argument(metavar="RUN...", help="Run directories or .mcap files; several are overlaid.")
+        list[Path],
+        typer.Argument(
+            metavar="RUN...",
+            help="Run directories or .mcap files; several are overlaid.",
+            autocompletion=completion.runs,
+        ),
     ],
     signals: Annotated[
         list[str] | None,
@@ -90,7 +104,14 @@ def _span_s(text: str | None) -> tuple[float, float]:
 def export(
     run_dir: RunArgument, out: Annotated[Path, typer.Argument(metavar="OUT.csv", help="CSV file, or - for stdout.")]
 ) -> int:
-    """Write a run as CSV, one row per tick, units in the header."""
+    """Write a run as CSV, one row per tick, units in the header.
+
+    Truth at the tick, not the reading; every float with all its digits, so that it reads back to the same number.
+
+    Exit codes: 0 written, 2 not a run, or the file cannot be written.
+
+    Examples: sil export runs/mrac-rs232-001 run.csv | sil export runs/mrac-rs232-001 - > run.csv
+    """
     from sil.report.export import export as write
 
     write(opened(run_dir), out)
