@@ -56,6 +56,10 @@ def runs(incomplete: str) -> list[Offer]:
     return _fitting(((str(folder), _verdict(folder)) for folder in folders[:MOST_FILES]), incomplete)
 
 
+def runs_and_scenarios(incomplete: str) -> list[Offer]:
+    return [*runs(incomplete), *scenarios(incomplete)]
+
+
 def clocks(incomplete: str) -> list[Offer]:
     return _fitting(CLOCKS, incomplete)
 
