@@ -139,7 +139,7 @@ class Reader:
             SOURCES.get(acting.source, ""),
             (h_x, h_y, h_z),
             late_ns[max(self._late_seen, len(late_ns) - MOST_NEW) :].tolist(),
-            answer_ns[max(self._answers_seen, len(answer_ns) - MOST_NEW) :],
+            list(answer_ns[max(self._answers_seen, len(answer_ns) - MOST_NEW) :]),
             loop.rebased_ticks,
             self.counters(),
             list(self._samples),
