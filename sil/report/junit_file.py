@@ -33,14 +33,19 @@ class JunitFile:
         self._over = False
 
     def __enter__(self) -> Self:
-        from_outside = self._file is not None and not (
-            self._out is not None and self._file.resolve().is_relative_to(self._out.resolve())
-        )
-        if from_outside:
+        if self._file is not None and not self._is_inside(self._out):
             from sil.report.junit import NOT_ENDED
 
             self._write_nothing_found(NOT_ENDED, "not ended")
         return self
+
+    def leave_empty(self, out: Path | None) -> None:
+        """The run is going to be in `out`, which only the scenario knew: a file of ours must not be in its way."""
+        if self._file is not None and self._is_inside(out):
+            self._file.unlink(missing_ok=True)
+
+    def _is_inside(self, out: Path | None) -> bool:
+        return out is not None and self._file is not None and self._file.resolve().is_relative_to(out.resolve())
 
     def finished(self, summary: Mapping[str, Any]) -> None:
         """The run has come to its end; summary: as run_scenario returns it. Raises UsageError."""

@@ -209,8 +209,10 @@ def _run(name: str, load: Callable[[], Scenario], told: Told, wired: bool) -> in
 
     with JunitFile(told.junit, name, told.out) as page:
         scenario = page.scenario = load()
+        out = told.out or (Path(scenario.out) if scenario.out else None)
+        page.leave_empty(out)
         watch = new_watch(scenario.name, told.verbosity, told.as_json)
-        summary = run_scenario(scenario, told.out or (Path(scenario.out) if scenario.out else None), watch, wired=wired)
+        summary = run_scenario(scenario, out, watch, wired=wired)
         if summary["failure"]:
             print(summary["failure"], file=sys.stderr)
         if told.as_json:

@@ -192,6 +192,17 @@ def test_nothing_is_put_into_a_run_directory_that_has_to_be_empty(tmp_path: Path
     assert (out / "results.xml").is_file()
 
 
+def test_nor_into_one_that_the_scenario_names(tmp_path: Path) -> None:
+    """`out` may stand in the scenario file, which is read after the file was begun."""
+    out = tmp_path / "run"
+    with JunitFile(out / "results.xml", "x") as page:
+        page.leave_empty(out)
+        assert list(out.iterdir()) == []
+    with JunitFile(tmp_path / "results.xml", "x") as page:
+        page.leave_empty(out)
+        assert says(tmp_path / "results.xml") == junit.NOT_ENDED
+
+
 def test_the_file_is_whole_or_not_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "results.xml"
     junit.write(file, "old")
