@@ -36,29 +36,12 @@ from sil.trouble import (
     LinkFailure,
     UsageError,
 )
+from sil.watch import Guarded
+from sil.watch import Watch as Watch
 
 PORT_COUNTERS = ("crc_errors", "discarded_bytes", "unknown", "sequence_gaps", "duplicates", "strangers")
 MANY_TICKS = 20_000  # whose log takes more than two seconds to seal
 NUMBERS_DEPEND_ON = ("numpy", "numba")
-
-
-class Watch:
-    """What a run shows of itself while it goes on; this one shows nothing. The CLI hands in one that draws."""
-
-    def note(self, line: str) -> None:
-        """Something worth a line: a board that compiles, a pty that waits for its board."""
-
-    def plugged(self, scenario: Scenario, rig: Rig) -> None:
-        """Everything is assembled and the board READY; the rig may be read from now on, never written."""
-
-    def tick(self, tick: int, ticks: int, motion: Motion) -> None:
-        """A tick is over."""
-
-    def event(self, tick: int, code: int, a: int, b: int, origin: int = 0) -> None:
-        """Something happened, in the numbers of protocol.events; origin 0: the laboratory says so, 1: the board."""
-
-    def stage(self, name: str) -> None:
-        """`start`, `run`, `seal`."""
 
 
 def run_scenario(
@@ -71,7 +54,7 @@ def run_scenario(
     later is in the summary (`failure`, exit code 3), since what was recorded until then is kept. wired: somebody else
     starts the board; wait for it.
     """
-    watch = watch or Watch()
+    watch = Guarded(watch) if watch is not None else Watch()
     refuse_hopeless(scenario)
     refuse_impossible(scenario.clock)
     folder, made = new_run_dir(scenario.name, out)
