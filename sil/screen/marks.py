@@ -21,7 +21,7 @@ def filled(share: float, width: int) -> tuple[str, str]:
     """(bar, rest) of together `width` characters; share 0..1, more is full. The bar ends on half a character."""
     if width <= 0:
         return "", ""
-    halves = 0 if not share > 0 else min(math.ceil(share * 2 * width), 2 * width)
+    halves = math.ceil(min(share, 1.0) * 2 * width) if share > 0 else 0
     bar = FULL * (halves // 2) + (LEFT_HALF if halves % 2 else "")
     return bar, FULL * (width - len(bar))
 
@@ -31,7 +31,7 @@ def about_zero(share: float, width: int) -> tuple[str, str, str]:
     side = max(width // 2, 0)
     if not math.isfinite(share):
         share = math.copysign(1.0, share) if math.isinf(share) else 0.0
-    halves = min(round(abs(share) * 2 * side), 2 * side)
+    halves = round(min(abs(share), 1.0) * 2 * side)
     whole, half = divmod(halves, 2)
     empty = FULL * (side - whole - half)
     if share < 0:

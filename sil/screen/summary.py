@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from sil.screen import NORMAL, QUIET, VERBOSE, requirement_text
@@ -28,17 +29,17 @@ def show(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
     console = Console(highlight=False, soft_wrap=True)
     console.width = max(console.width, NARROWEST)
     if verbosity <= QUIET:
-        console.print(f"{_verdict(summary)}  {summary['scenario']}: {summary['run_dir']}")
+        console.print(f"{_verdict(summary)}  {escape(summary['scenario'])}: {escape(summary['run_dir'])}")
         return
     timing = summary["timing"]
     console.print(
-        f"{_verdict(summary)}  {summary['scenario']}: {summary['ticks']} ticks, "
+        f"{_verdict(summary)}  {escape(summary['scenario'])}: {summary['ticks']} ticks, "
         f"{summary['duration_s']:g} s in {timing['wall_s']:.2f} s ({timing['times_real_time']:,.0f} x real time)"
     )
     console.print(_errors_and_torques(summary))
     for line in summary["require"]:
         mark = "[green]met   [/]" if line["passed"] else "[red]failed[/]"
-        console.print(f"{mark} {requirement_text(line)}")
+        console.print(f"{mark} {escape(requirement_text(line))}")
     if summary["not_a_number"]:
         console.print(f"[red]failed[/] torque or plant was not a number, {summary['not_a_number']} times")
     for line in (*_lateness(summary), *_link(summary)):
@@ -46,7 +47,7 @@ def show(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
     if verbosity >= VERBOSE:
         for line in _detail(timing):
             console.print(line)
-    console.print(f"run: {summary['run_dir']}   sha256 {summary['sha256'][:16]}")
+    console.print(f"run: {escape(summary['run_dir'])}   sha256 {summary['sha256'][:16]}")
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
@@ -112,10 +113,11 @@ def _detail(timing: Mapping[str, Any]) -> Iterator[str]:
     yield f"time: {timing['start_s']:.2f} s to start, {timing['wall_s']:.2f} s to run, {timing['seal_s']:.2f} s to seal"
     if timing["answer_us"]["max"] is not None:
         yield f"answers after: {_percentiles(timing['answer_us'])}"
-    if timing.get("priority") is not None:
-        yield f"priority: SCHED_FIFO {timing['priority']}"
-    for refused in timing.get("refused", ()):
-        yield f"[yellow]refused[/]: {refused}"
+    granted = timing.get("granted") or {}
+    if granted.get("priority") is not None:
+        yield f"priority: SCHED_FIFO {granted['priority']}"
+    for refused in granted.get("refused", ()):
+        yield f"[yellow]refused[/]: {escape(refused)}"
     latest = _causes(timing, "latest_percent")
     if latest:
         yield f"the latest hundredth of all wake-ups: {latest}"

@@ -7,6 +7,7 @@ elsewhere (sil.screen.painter). What a slow terminal does not take is dropped an
 from __future__ import annotations
 
 import atexit
+import math
 import os
 import select
 import socket
@@ -14,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from sil.boards.process import child_environment
@@ -33,8 +35,10 @@ DRAW_EVERY_S = 0.1
 SELDOM_S = 1.0  # where a look costs a good part of a period
 PLAIN_EVERY_S = 10.0
 COST_SHARE = 0.02  # of the time, at most, goes into looking
-PATIENCE_S = 1.0  # for the process that draws: to begin, and to end
+PATIENCE_S = 5.0  # for the process that draws to begin, and to end, on a busy machine
+STOPPED_S = 1.0  # for it to end where the terminal takes nothing
 TOLD_EACH = 3  # events of one kind that get a line of their own; later ones are counted
+LOOK_S = 0.1
 NARROWEST, LOWEST = 40, 8  # a window smaller than this gets lines
 
 
@@ -71,7 +75,7 @@ class Lines(Watch):
     def __init__(self, title: str, verbosity: int = 0) -> None:
         self._title, self._verbosity = title, verbosity
         self._paced = False
-        self._running = False
+        self._in_a_hurry = False  # nothing may wait for a terminal
         self._plan: Plan | None = None
         self._reader: Reader | None = None
         self._next_s = 0.0
@@ -93,7 +97,7 @@ class Lines(Watch):
                 self._say(line)
 
     def stage(self, name: str) -> None:
-        self._running = name == "run"
+        self._in_a_hurry = name == "seal" or (name == "run" and self._paced)
         self._next_s = time.monotonic() + PLAIN_EVERY_S
         if name == "seal":
             self._over()
@@ -131,8 +135,8 @@ class Lines(Watch):
         self._untold.clear()
 
     def _say(self, line: str) -> None:
-        """A line on stderr. A paced run does not wait for whoever reads it: what he does not take is counted."""
-        if self._running and self._paced and not _takes_more():
+        """A line on stderr. Neither a paced run nor the sealing of its log waits for whoever reads it."""
+        if self._in_a_hurry and not _takes_more():
             self._dropped += 1
             return
         print(line, file=sys.stderr, flush=True)
@@ -140,7 +144,7 @@ class Lines(Watch):
     def _over(self) -> None:
         self._tell_untold()
         if self._dropped:
-            print(f"{self._dropped} lines were not shown: nobody read them in time", file=sys.stderr, flush=True)
+            self._say(f"{self._dropped} lines were not shown: nobody read them in time")
 
 
 class Live(Lines):
@@ -149,6 +153,7 @@ class Live(Lines):
     def __init__(self, title: str, verbosity: int = 0) -> None:
         super().__init__(title, verbosity)
         self._painter: Painter | None = None
+        self._can_start = True
         self._last: tuple[int, Motion] | None = None
 
     def plugged(self, scenario: Scenario, rig: Rig) -> None:
@@ -172,6 +177,9 @@ class Live(Lines):
     def _look(self, tick: int, motion: Motion, now: float) -> None:
         if self._painter is None:
             self._start_painter()
+        if self._painter is None:
+            self._next_s = math.inf
+            return
         self._tell(tick, motion)
         cost_s = time.monotonic() - now
         self._next_s = now + max(DRAW_EVERY_S, cost_s / COST_SHARE)
@@ -186,7 +194,14 @@ class Live(Lines):
 
     def _start_painter(self) -> None:
         assert self._plan is not None
-        self._painter = Painter(wait=self._paced)
+        if not self._can_start:
+            return
+        try:
+            self._painter = Painter(wait=self._paced)
+        except OSError as error:
+            self._can_start = False
+            self._say(f"no live view: cannot start the process that draws ({error.strerror})")
+            return
         self._painter.tell(self._plan)
 
     def _event_line(self, tick: int, code: int, a: int, b: int, origin: int) -> None:
@@ -234,13 +249,23 @@ class Painter:
         """Let it draw once more and end. One that hangs on a stopped terminal is ended: the log has to be sealed."""
         atexit.unregister(self.close)
         self.tell(End())
-        self._orders.close()
-        try:
-            self._child.wait(PATIENCE_S)
-        except subprocess.TimeoutExpired:
-            self._child.kill()
-            self._child.wait()
-            atexit.register(_show_cursor)
+        with suppress(OSError):
+            self._orders.shutdown(socket.SHUT_WR)  # says the same where the queue is full
+        self._await_end()
+        self._orders.close()  # not before: what it has not read yet would be lost
+
+    def _await_end(self) -> None:
+        give_up = time.monotonic() + PATIENCE_S
+        stopped_s = 0.0
+        while time.monotonic() < give_up and stopped_s < STOPPED_S:
+            try:
+                self._child.wait(LOOK_S)
+                return
+            except subprocess.TimeoutExpired:
+                stopped_s = 0.0 if _takes_more() else stopped_s + LOOK_S
+        self._child.kill()
+        self._child.wait()
+        atexit.register(_show_cursor)
 
 
 def _takes_more() -> bool:
@@ -254,7 +279,8 @@ def _takes_more() -> bool:
 
 
 def _show_cursor() -> None:
-    print("\x1b[?25h", end="", file=sys.stderr, flush=True)
+    if _takes_more():
+        print("\x1b[?25h", end="", file=sys.stderr, flush=True)
 
 
 Terminal = Live  # its name before there were lines of their own
