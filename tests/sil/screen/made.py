@@ -55,7 +55,9 @@ def rig(board: bool = True, paced: bool = False) -> Any:
         setpoints=lambda k: (0, 0, 0),
     )
     clock = SimpleNamespace(paced=paced, scale=1.0)
-    made = SimpleNamespace(loop=loop, clock=clock, answers=None, port=None, window=None, session=None, orders=None, plugged=("none", ""))
+    made = SimpleNamespace(
+        loop=loop, clock=clock, answers=None, port=None, window=None, session=None, orders=None, plugged=("none", "")
+    )
     if board:
         made.answers = SimpleNamespace(telemetry=None, answer_ns=[], strays=0)
         made.plugged = ("process", "pty")

@@ -6,6 +6,7 @@ import os
 import select
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -78,33 +79,30 @@ def test_a_line_of_progress(lines: Any, monkeypatch: pytest.MonkeyPatch) -> None
     assert line.startswith("name:  50 %  t    299.5 s   attitude   10.00    0.00    0.00 deg")
 
 
-@pytest.fixture
-def full_pipe(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """Standard error is a pipe that nobody reads, and it is full."""
+@contextmanager
+def nobody_reads_stderr(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Standard error is a pipe, and it is full; yields the end that could be read."""
     reading, writing = os.pipe()
-    os.set_blocking(writing, False)
     while select.select([], [writing], [], 0)[1]:
         os.write(writing, b"x" * 4096)
-    os.set_blocking(writing, True)
-    with os.fdopen(writing, "w") as file:
-        monkeypatch.setattr(sys, "stderr", file)
+    with os.fdopen(writing, "w") as file, monkeypatch.context() as patch:
+        patch.setattr(sys, "stderr", file)
         yield reading
-        os.set_blocking(reading, False)
-        os.read(reading, 1 << 20)
-        os.close(reading)
+    os.close(reading)
 
 
-def test_a_paced_run_does_not_wait_for_who_reads_its_lines(full_pipe: int) -> None:
+def test_a_paced_run_does_not_wait_for_who_reads_its_lines(monkeypatch: pytest.MonkeyPatch) -> None:
     """Protects: `sil run ... 2>&1 | less` in real time. Fails by hanging."""
-    made_watch = watch.Lines("name", NORMAL)
-    made_watch.plugged(load_scenario("rigid-open-loop"), made.rig(board=False, paced=True))
-    made_watch.stage("run")
-    made_watch.event(1, events.COMMAND_MISSED, 1, 1)
-    made_watch.stage("seal")
-    made_watch.note("sealing the log")
-    os.read(full_pipe, 1 << 20)
-    made_watch.note("read again")
-    assert os.read(full_pipe, 1 << 20) == b"read again\n"
+    with nobody_reads_stderr(monkeypatch) as pipe:
+        made_watch = watch.Lines("name", NORMAL)
+        made_watch.plugged(load_scenario("rigid-open-loop"), made.rig(board=False, paced=True))
+        made_watch.stage("run")
+        made_watch.event(1, events.COMMAND_MISSED, 1, 1)
+        made_watch.stage("seal")
+        made_watch.note("sealing the log")
+        os.read(pipe, 1 << 20)
+        made_watch.note("read again")
+        assert os.read(pipe, 1 << 20) == b"read again\n"
 
 
 def test_an_unreadable_path_is_no_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
