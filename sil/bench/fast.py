@@ -1,8 +1,10 @@
 """Bench `fast`: commands that miss their tick in a fast loop, beside cyclictest's wake-ups later than a period.
 
 ours    `sil run`: law pd, T_s 0.01 s in real time, a minute, over a pty without a modelled bit rate, TELEMETRY in 1 of
-        10 ticks. A miss is a tick at which the command due had not come.
-beside  cyclictest at 100 Hz in the minute after it: a wake-up later than a period would have been a miss for anybody.
+        10 ticks. `missed`: ticks at which the command due had not come. `real misses`: these, and ticks at which the
+        board's own timer fired (2 ms) though the SAMPLE was there in time by the model: the run is not reproducible.
+beside  cyclictest at 100 Hz in the minute after it: wake-ups later than a period, which would have been a miss for
+        anybody, and later than 2 ms, which would have let anybody's board run into its timer.
 """
 
 from __future__ import annotations
@@ -17,6 +19,8 @@ from sil.bench.wakers import Waker, find_waker
 from sil.bench.wakeup import NO_FIFO, START_S, clock_keys, policy, priorities, scenario_file
 
 PERIOD_S = 0.01
+TIMEOUT_S = 0.2 * PERIOD_S  # of the board's own timer, as a scenario has it by default
+TOLD = ("late_ticks", "rebased_ticks", "degraded_ticks", "causes", "granted")  # of a run, in the details
 MOST_REPEATS = 2  # each takes two minutes per policy
 EXCESS = 1.0
 
@@ -59,14 +63,17 @@ def one_pair(plan: Plan, book: Book, waker: Waker, priority: int, what: str, fol
     run = flights.paced(scenario_file(folder, PERIOD_S, ticks), folder / "run", keys, wall_s(plan))
     plan.doing(f"fast: {waker.name}, {what}")
     late_us = waker.lateness_us(round(PERIOD_S * 1e6), ticks, priority, lab)
-    beyond = sum(late > PERIOD_S * 1e6 for late in late_us)
     link, timing = run.summary["link"], run.summary["timing"]
     goal = Goal(EXCESS, of="excess", judged="each")
-    case = f"misses in {wall_s(plan):g} s, {policy(priority)}"
-    book.line(case, "ticks", f"{waker.name}, late > {PERIOD_S * 1e3:g} ms", goal).add(link["missed"], beyond)
+    for case, ours, limit_us, judge in (
+        (f"missed in {wall_s(plan):g} s", link["missed"], PERIOD_S * 1e6, goal),
+        (f"real misses in {wall_s(plan):g} s", link["real_misses"], TIMEOUT_S * 1e6, None),
+    ):
+        beside_what = f"{waker.name} > {limit_us * 1e-3:g} ms"
+        beyond = sum(late > limit_us for late in late_us)
+        book.line(f"{policy(priority)}, {case}", "ticks", beside_what, judge).add(ours, beyond)
     answer = timing["answer_us"]
-    book.line(f"answer p99, {policy(priority)}", "us").add(answer["p99"])
-    book.line(f"answer max, {policy(priority)}", "us").add(answer["max"])
-    counts = {"real_misses": link["real_misses"], "degraded_ticks": timing["degraded_ticks"]}
-    causes = {name: timing[name] for name in ("late_ticks", "rebased_ticks", "causes", "refused") if name in timing}
-    book.details.setdefault("runs", []).append({"policy": policy(priority), **counts, **causes})
+    book.line(f"{policy(priority)}, answer p99", "us").add(answer["p99"])
+    book.line(f"{policy(priority)}, answer max", "us").add(answer["max"])
+    told = {name: timing[name] for name in TOLD if name in timing}
+    book.details.setdefault("runs", []).append({"policy": policy(priority), **told})

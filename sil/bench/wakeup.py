@@ -90,7 +90,10 @@ def one_round(plan: Plan, book: Book, waker: Waker, pace: Pace, priority: int, w
         plan.doing(f"wakeup: sil run{' asleep' if more else ''}, {what}")
         run = flights.paced(file, folder / name, [*keys, *more], ticks / pace.rate_hz)
         found[name] = run.lateness_us[1:]
-        for refused in run.summary["timing"].get("refused", ()):
+        timing = run.summary["timing"]
+        told = {key: timing[key] for key in ("late_ticks", "causes", "granted") if key in timing}
+        book.details.setdefault("runs", []).append({"case": f"{what}, {name}", **told})
+        for refused in (timing["granted"] or {}).get("refused", ()):
             book.note(f"refused: {refused}")
     plan.doing(f"wakeup: {waker.name}, {what}")
     beside = waker.lateness_us(1_000_000 // pace.rate_hz, ticks, priority, lab)
