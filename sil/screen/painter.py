@@ -26,6 +26,7 @@ from sil.screen.seen import Seen
 DRAW_EVERY_S = 0.1
 COST_SHARE = 0.2  # of the time, at most, goes into drawing
 LOOK_EVERY_S = 0.5  # at the size of the window, when nothing comes
+LINES_AT_ONCE = 5000
 BIGGEST = 1 << 20  # bytes of a datagram
 READY = b"ready"
 BEGIN_FRAME, END_FRAME = "\x1b[?2026h", "\x1b[?2026l"  # synchronized output; terminals that do not know it ignore it
@@ -62,6 +63,7 @@ class Painter:
         self._seen: Seen | None = None
         self._size = os.terminal_size((0, 0))
         self._live: Live | None = None
+        self._lines: list[str] = []  # that stay above the view; printed together, since each print draws the view anew
         self._over = False
 
     def work(self) -> None:
@@ -82,7 +84,7 @@ class Painter:
 
     def _take_all(self) -> None:
         """Everything that has come by now: after a stopped terminal, only the newest is worth drawing."""
-        while not self._over:
+        while not self._over and len(self._lines) < LINES_AT_ONCE:
             try:
                 data = self._orders.recv(BIGGEST, socket.MSG_DONTWAIT)
             except BlockingIOError:
@@ -97,11 +99,14 @@ class Painter:
         elif isinstance(message, State) and self._seen is not None:
             self._seen.take(message)
         elif isinstance(message, Line):
-            self._console.print(Text(message.text), soft_wrap=True)
+            self._lines.append(message.text)
         elif isinstance(message, End):
             self._over = True
 
     def _draw(self) -> None:
+        if self._lines:
+            self._console.print(Text("\n".join(self._lines)), soft_wrap=True)
+            self._lines.clear()
         if self._seen is None or self._seen.state is None:
             return
         self._seen.ended = self._over
