@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from sil.trouble import SilError
 
@@ -66,7 +66,7 @@ def run_child(
     except subprocess.TimeoutExpired:
         raise ChildFailed(f"{command[0]}: expected it to end within {timeout_s:g} s") from None
     finally:
-        _end(child)
+        end(child)
     said = Said(out, err, child.returncode)
     if said.code not in good:
         raise ChildFailed(f"{command[0]}: {said.last_words}")
@@ -88,7 +88,8 @@ def _prctl(what: int, value: int) -> None:
         ctypes.CDLL(None).prctl(what, int(value), 0, 0, 0)
 
 
-def _end(child: subprocess.Popen[str]) -> None:
+def end(child: subprocess.Popen[Any]) -> None:
+    """See to it that it is gone: asked first, killed then."""
     if child.poll() is None:
         child.terminate()
         try:

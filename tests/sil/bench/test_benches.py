@@ -3,18 +3,35 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from sil.bench import loop, plant
 from sil.bench.book import Book, Plan
+from sil.bench.children import cpus
 from sil.bench.codec import bare, frames_of_a_tick, ours
+from sil.bench.lockstep import ping_pong_us
 from sil.bench.series import run_series
 from sil.bench.tape import Tape
 from sil.cli import app
 from sil.sinks.nothing import Nothing
+
+
+def test_a_ping_pong_ends_with_its_child_gone() -> None:
+    """A hung-up terminal reads as an error or as the end of the file; the child must take both as its end."""
+    before = children()
+    for _ in range(3):
+        assert ping_pong_us(79, 150, 20, cpus()[1]) > 0.0
+    assert children() == before
+
+
+def children() -> list[str]:
+    """Process ids of this process's children."""
+    return Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
 
 
 @pytest.fixture
