@@ -66,9 +66,6 @@ def _tidy(schema: Schema) -> None:
     for part in _parts(schema):
         if "prefixItems" in part:
             part["items"] = part.pop("prefixItems")[0]
-    for part in _parts(schema["$defs"]["Wheels"]):
-        if part.get("type") == ["number", "null"]:  # a limit
-            part["exclusiveMinimum"] = 0
 
 
 def _parts(schema: Any) -> Iterator[Schema]:

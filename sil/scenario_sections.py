@@ -157,7 +157,7 @@ NUMBER: dict[str, Any] = {"type": "number"}
 Triple = Annotated[Numbers3, BeforeValidator(_triple)]
 OneOrThree = Annotated[Numbers3, BeforeValidator(_one_or_three), _one_or(NUMBER)]
 OneOrThreeNotNegative = Annotated[Numbers3, BeforeValidator(_not_negative), _one_or({**NUMBER, "minimum": 0})]
-LimitTriple = Annotated[Limits3, BeforeValidator(_limits), _one_or({"type": ["number", "null"]})]
+LimitTriple = Annotated[Limits3, BeforeValidator(_limits), _one_or({"type": ["number", "null"], "exclusiveMinimum": 0})]
 InertiaMatrix = Annotated[
     Matrix3, BeforeValidator(_inertia), _three_of({"anyOf": [NUMBER, _three_of(NUMBER).json_schema]})
 ]

@@ -19,7 +19,8 @@ def bench(
         ),
     ] = None,
     repeats: Annotated[
-        int | None, typer.Option("--repeats", min=1, max=1000, help="Interleaved repeats; default 5, quick 2.")
+        int | None,
+        typer.Option("--repeats", metavar="N", min=1, max=1000, help="Interleaved repeats; default 5, quick 2."),
     ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="Short ones, in about three minutes: to see that all of it works here.")
@@ -33,7 +34,9 @@ def bench(
     least that anybody would have to do.
 
     All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load
-    is in the table. The exit code says nothing about goals.
+    is in the table.
+
+    Exit codes: 0 measured, whatever the goals say, 2 no such bench, 130 interrupted.
 
     Examples: sil bench --quick | sil bench lockstep plant | sil bench wakeup --repeats 5 --json
     """

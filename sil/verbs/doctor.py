@@ -28,7 +28,8 @@ def doctor(
         ),
     ] = None,
     round_trips: Annotated[
-        int, typer.Option("--round-trips", min=1, max=1_000_000, help="With --link: how many to measure.")
+        int,
+        typer.Option("--round-trips", metavar="N", min=1, max=1_000_000, help="With --link: how many to measure."),
     ] = 1000,
     try_bauds: Annotated[
         bool, typer.Option("--try-bauds", help="With --link: where nothing answers, try the usual baud rates.")
@@ -41,7 +42,7 @@ def doctor(
     With it: the device, who else has it open, its USB latency timer; then HELLO, a thousand round trips with
     percentiles, and line errors. Ends the session of a board that is in one; leaves the board without a session.
 
-    Exit codes: 0 no problem (notes are none), 3 a problem, 2 no such link.
+    Exit codes: 0 no problem (notes are none), 2 no such link, 3 a problem, 130 interrupted.
 
     Examples: sil doctor | sil doctor --link /dev/ttyUSB0 --try-bauds | sil doctor --link udp://192.168.7.2:5005
     """

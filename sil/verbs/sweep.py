@@ -180,7 +180,7 @@ def sweep(
     failed for link, board, worker or timing; 130 interrupted.
 
     Examples: sil sweep mrac-rs232 --vary law.params.c2_pole=0.5:0.9:9 --vary seed=1:20 |
-    sil sweep appc-rs232 --vary "sensors.attitude.noise_deg=log(0.001,0.1)" --sample lhs -n 100 |
+    sil sweep mrac-rs232 --vary "law.params.c2_pole=uniform(0.5,0.9)" -n 100 |
     sil sweep appc-rs232 --vary-file monte-carlo.yaml -j 2 --keep on-fail |
     sil sweep --resume sweeps/appc-rs232-001
     """
