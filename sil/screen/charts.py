@@ -69,7 +69,7 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
     for place, cell_row in enumerate(cells):
         label = f"{labels[place]:.4g}" if place in labels else ""
         rows.append(_cells(Text.assemble((f"{label:>{LABEL - 1}} ", DIM)), cell_row, len(series), axis))
-    rows.append(Text(f"{'':{LABEL}}{_seconds(first):<{width - LABEL - 12}}{_seconds(now):>12}", DIM))
+    rows.append(Text(f"{'':{LABEL}}{_seconds(first):<{max(width - LABEL - 12, 0)}}{_seconds(now):>12}", DIM))
     for line in rows:
         line.truncate(width, pad=True)
     return rows

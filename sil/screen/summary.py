@@ -10,8 +10,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from sil.screen import NORMAL, QUIET, VERBOSE, requirement_text
+from sil.screen.palette import AXES, BAD, DIM, GOOD, TITLE, WARN
 
-AXES = ("roll", "pitch", "yaw")
 ALWAYS_SHOWN = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")  # the others if not zero
 NARROWEST = 80  # columns of the table: a narrow terminal wraps it, numbers are never cut
 BAR = 40  # characters of the fullest line of a histogram
@@ -38,10 +38,10 @@ def show(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
     )
     console.print(_errors_and_torques(summary))
     for line in summary["require"]:
-        mark = "[green]met   [/]" if line["passed"] else "[red]failed[/]"
+        mark = f"[{GOOD}]met   [/]" if line["passed"] else f"[{BAD}]failed[/]"
         console.print(f"{mark} {escape(requirement_text(line))}")
     if summary["not_a_number"]:
-        console.print(f"[red]failed[/] torque or plant was not a number, {summary['not_a_number']} times")
+        console.print(f"[{BAD}]failed[/] torque or plant was not a number, {summary['not_a_number']} times")
     for line in (*_lateness(summary), *_link(summary)):
         console.print(line)
     if verbosity >= VERBOSE:
@@ -51,8 +51,8 @@ def show(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
 
 
 def _verdict(summary: Mapping[str, Any]) -> str:
-    colour = {"passed": "green", "interrupted": "yellow", "degraded": "yellow"}.get(summary["verdict"], "red")
-    return f"[bold {colour}]{summary['verdict']}[/]"
+    colour = {"passed": f"bold {GOOD}", "interrupted": WARN, "degraded": WARN}.get(summary["verdict"], BAD)
+    return f"[{colour}]{summary['verdict']}[/]"
 
 
 def _errors_and_torques(summary: Mapping[str, Any]) -> Table:
@@ -72,7 +72,7 @@ def _link(summary: Mapping[str, Any]) -> Iterator[str]:
     if summary["board"] != "none":
         yield "link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items())
     if not summary["reproducible"]:
-        yield "[yellow]not reproducible[/]: commands missed the clock though the model had them in time"
+        yield f"[{WARN}]not reproducible[/]: commands missed the clock though the model had them in time"
 
 
 # -- timing of paced runs ------------------------------------------------------------------------------------------
@@ -87,7 +87,7 @@ def _lateness(summary: Mapping[str, Any]) -> Iterator[str]:
     yield f"wake-ups late by: {_percentiles(wakeup)}"
     late = max(timing.get("late_ticks", 0), timing["degraded_ticks"])
     if late:
-        colour = "yellow" if summary["verdict"] == "degraded" else "dim"
+        colour = WARN if summary["verdict"] == "degraded" else DIM
         beyond_ms = timing.get("late_beyond_ms")
         limit = f"more than {beyond_ms:g} ms" if beyond_ms else "more than a period"
         causes = _causes(timing, "late_ticks")
@@ -117,7 +117,7 @@ def _detail(timing: Mapping[str, Any]) -> Iterator[str]:
     if granted.get("priority") is not None:
         yield f"priority: SCHED_FIFO {granted['priority']}"
     for refused in granted.get("refused", ()):
-        yield f"[yellow]refused[/]: {escape(refused)}"
+        yield f"[{WARN}]refused[/]: {escape(refused)}"
     latest = _causes(timing, "latest_percent")
     if latest:
         yield f"the latest hundredth of all wake-ups: {latest}"
@@ -135,7 +135,7 @@ def _histogram(histogram: Mapping[str, list[int]] | None) -> Iterator[str]:
     for place in range(filled[0], filled[-1] + 1):
         count = counts[place]
         edge = f"up to {_duration(edges[place])}" if place < len(edges) else f"beyond {_duration(edges[-1])}"
-        yield f"  {edge:>15}  {count:>8}  [cyan]{'━' * -(-BAR * count // top)}[/]".rstrip()
+        yield f"  {edge:>15}  {count:>8}  [{TITLE}]{'━' * -(-BAR * count // top)}[/]".rstrip()
 
 
 def _duration(us: float) -> str:

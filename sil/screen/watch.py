@@ -37,6 +37,7 @@ PLAIN_EVERY_S = 10.0
 COST_SHARE = 0.02  # of the time, at most, goes into looking
 PATIENCE_S = 5.0  # for the process that draws to begin, and to end, on a busy machine
 STOPPED_S = 1.0  # for it to end where the terminal takes nothing
+MOST_LINES = 1000  # that wait for a look
 TOLD_EACH = 3  # events of one kind that get a line of their own; later ones are counted
 LOOK_S = 0.1
 NARROWEST, LOWEST = 40, 8  # a window smaller than this gets lines
@@ -154,6 +155,7 @@ class Live(Lines):
         super().__init__(title, verbosity)
         self._painter: Painter | None = None
         self._can_start = True
+        self._waiting: list[str] = []  # lines for the next look: one datagram, however many
         self._last: tuple[int, Motion] | None = None
 
     def plugged(self, scenario: Scenario, rig: Rig) -> None:
@@ -189,7 +191,11 @@ class Live(Lines):
 
     def _tell(self, tick: int, motion: Motion) -> None:
         assert self._reader is not None
-        if self._painter is not None and self._painter.tell(self._reader.state(tick, motion)):
+        if self._painter is None:
+            return
+        if self._waiting and self._painter.tell(Line("\n".join(self._waiting))):
+            self._waiting.clear()
+        if self._painter.tell(self._reader.state(tick, motion)):
             self._reader.told()
 
     def _start_painter(self) -> None:
@@ -211,7 +217,9 @@ class Live(Lines):
     def _say(self, line: str) -> None:
         if self._painter is None:
             super()._say(line)
-        elif not self._painter.tell(Line(line)):
+        elif len(self._waiting) < MOST_LINES:
+            self._waiting.append(line)
+        else:
             self._dropped += 1
 
     def _over(self) -> None:
@@ -220,6 +228,7 @@ class Live(Lines):
                 self._tell(*self._last)
             self._painter.close()
             self._painter = None
+            self._dropped += len(self._waiting)
         super()._over()
 
 
