@@ -46,12 +46,3 @@ def show_table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     for row in rows:
         table.add_row(*row)
     Console(highlight=False).print(table)
-
-
-def __getattr__(name: str) -> Any:
-    """Silent and Terminal, the watches by their own names."""
-    if name in ("Silent", "Terminal"):
-        from importlib import import_module
-
-        return getattr(import_module("sil.screen.watch"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

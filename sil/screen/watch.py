@@ -290,6 +290,3 @@ def _takes_more() -> bool:
 def _show_cursor() -> None:
     if _takes_more():
         print("\x1b[?25h", end="", file=sys.stderr, flush=True)
-
-
-Terminal = Live  # its name before there were lines of their own
