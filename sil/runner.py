@@ -333,7 +333,6 @@ def _timing(scenario: Scenario, outcome: Outcome, report: SealReport) -> dict[st
         "times_real_time": simulated_s / outcome.wall_s if outcome.wall_s > 0 else 0.0,
         **wakes,
         "answer_us": lateness.percentiles_us(rig.answers.answer_ns if rig and rig.answers else []),
-        "degraded_ticks": wakes["late_ticks"],
         "degraded": too_many or outcome.suspended_s > 0,
         "rebased_ticks": loop.rebased_ticks if loop is not None else 0,
         "slipped_s": loop.slipped_ns * 1e-9 if loop is not None else 0.0,

@@ -20,7 +20,7 @@ from sil.bench.wakeup import NO_FIFO, START_S, clock_keys, policy, priorities, s
 
 PERIOD_S = 0.01
 TIMEOUT_S = 0.2 * PERIOD_S  # of the board's own timer, as a scenario has it by default
-TOLD = ("late_ticks", "rebased_ticks", "degraded_ticks", "causes", "granted")  # of a run, in the details
+TOLD = ("late_ticks", "rebased_ticks", "causes", "granted")  # of a run, in the details
 MOST_REPEATS = 2  # each takes two minutes per policy
 EXCESS = 1.0
 

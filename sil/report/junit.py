@@ -87,7 +87,7 @@ def _run_case(summary: Mapping[str, Any]) -> Case:
     if summary["failure"]:
         return _wrong(case, "error", "failed", summary["failure"])
     if timing["degraded"]:
-        late = f"{timing['degraded_ticks']} of {summary['ticks']} ticks late, slipped {timing['slipped_s']:.3f} s"
+        late = f"{timing['late_ticks']} of {summary['ticks']} ticks late, slipped {timing['slipped_s']:.3f} s"
         return _wrong(case, "error", "degraded", f"timing degraded: {late}: a busy machine or too fast a clock")
     if summary["not_a_number"]:
         times = summary["not_a_number"]

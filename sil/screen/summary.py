@@ -85,7 +85,7 @@ def _lateness(summary: Mapping[str, Any]) -> Iterator[str]:
     if wakeup["max"] is None:
         return
     yield f"wake-ups late by: {_percentiles(wakeup)}"
-    late = max(timing.get("late_ticks", 0), timing["degraded_ticks"])
+    late = timing["late_ticks"]
     if late:
         colour = WARN if summary["verdict"] == "degraded" else DIM
         beyond_ms = timing.get("late_beyond_ms")
@@ -96,9 +96,9 @@ def _lateness(summary: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _percentiles(us: Mapping[str, float]) -> str:
-    """`p50 0.06 ms, p99 0.12 ms, p99.9 0.30 ms, at most 1.24 ms`"""
+    """`p50 0.34 us, p99 1.07 ms, p99.9 2.61 ms, at most 3.54 ms`"""
     names = (("p50", "p50"), ("p99", "p99"), ("p99_9", "p99.9"), ("max", "at most"))
-    return ", ".join(f"{label} {us[key] / 1000:.3g} ms" for key, label in names)
+    return ", ".join(f"{label} {_duration(us[key])}" for key, label in names)
 
 
 def _causes(timing: Mapping[str, Any], which: str) -> str:
@@ -141,8 +141,8 @@ def _histogram(histogram: Mapping[str, list[int]] | None) -> Iterator[str]:
 def _duration(us: float) -> str:
     for scale, unit in ((1e6, "s"), (1e3, "ms")):
         if us >= scale:
-            return f"{us / scale:g} {unit}"
-    return f"{us:g} us"
+            return f"{us / scale:.3g} {unit}"
+    return f"{us:.3g} us"
 
 
 def _number(value: float | None, scale: float) -> str:

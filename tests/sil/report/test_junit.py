@@ -35,7 +35,7 @@ def scenario() -> Scenario:
 def summary_of(scenario: Scenario, error_deg: float = 0.01, **changes: Any) -> dict[str, Any]:
     """A summary as run_scenario returns it, of a run that passed unless `changes` say otherwise."""
     metrics = {"rms_error_deg": [error_deg, 0.0, 0.0], "missed": 0, "diverged_at_s": 50.0}
-    timing = {"start_s": 0.5, "wall_s": 1.25, "seal_s": 0.25, "degraded": False, "degraded_ticks": 0, "slipped_s": 0.0}
+    timing = {"start_s": 0.5, "wall_s": 1.25, "seal_s": 0.25, "degraded": False, "late_ticks": 0, "slipped_s": 0.0}
     timing |= changes.pop("timing", {})
     require = [judgement._asdict() for judgement in judge(scenario.require, metrics)]
     verdict = {"verdict": "passed", "exit_code": 0, "failure": "", "reason": "finished", "not_a_number": 0}
@@ -113,7 +113,7 @@ def test_not_a_number_fails_its_requirement_without_a_margin(scenario: Scenario)
     assert "margin" not in facts(root.findall("testcase")[1])
 
 
-LATE = {"degraded": True, "degraded_ticks": 3}
+LATE = {"degraded": True, "late_ticks": 3}
 WRONG: dict[str, tuple[dict[str, Any], str, str]] = {
     "link": ({"verdict": "failed", "exit_code": 3, "failure": "board: gone", "require": []}, "error", "board: gone"),
     "interrupted": ({"verdict": "interrupted", "exit_code": 130, "require": []}, "error", "after 1200 ticks"),
