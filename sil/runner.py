@@ -36,8 +36,7 @@ from sil.trouble import (
     LinkFailure,
     UsageError,
 )
-from sil.watch import Guarded
-from sil.watch import Watch as Watch
+from sil.watch import Guarded, Watch
 
 PORT_COUNTERS = ("crc_errors", "discarded_bytes", "unknown", "sequence_gaps", "duplicates", "strangers")
 MANY_TICKS = 20_000  # whose log takes more than two seconds to seal

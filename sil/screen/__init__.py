@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sil.runner import Watch
+    from sil.watch import Watch
 
 QUIET, NORMAL, VERBOSE = -1, 0, 1
 

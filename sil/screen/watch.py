@@ -19,12 +19,12 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from sil.boards.process import child_environment
-from sil.runner import Watch
 from sil.screen import QUIET, VERBOSE, facts, messages
 from sil.screen.messages import End, Line, Message, Plan
 from sil.screen.reading import Reader, plan_of
 from sil.signals import Motion
 from sil.sinks.events import describe, level_of
+from sil.watch import Watch
 
 if TYPE_CHECKING:
     from sil.rig import Rig

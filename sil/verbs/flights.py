@@ -6,8 +6,8 @@ import sys
 import time
 from typing import Any
 
-from sil.runner import Watch
 from sil.signals import Motion
+from sil.watch import Watch
 
 _DRAW_EVERY_S = 0.1
 

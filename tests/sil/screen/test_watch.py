@@ -14,9 +14,9 @@ import made
 import pytest
 
 from protocol import events
-from sil.runner import Watch
 from sil.scenario import load_scenario
 from sil.screen import NORMAL, QUIET, VERBOSE, new_watch, watch
+from sil.watch import Watch
 
 
 @pytest.fixture
