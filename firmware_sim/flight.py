@@ -67,7 +67,9 @@ class Flight:
         """Compile on copies: the next SAMPLE is answered in time, and the flight state is untouched."""
         inp = self._inp.copy()
         inp[inputs.FRESH] = 1
-        copy.deepcopy(self._reference).advance(inp)
+        reference = copy.deepcopy(self._reference)
+        reference.advance(inp)
+        reference.words()
         self._law.warm_up(inp, self._reference.state, self._out)
 
     def _begin(self) -> None:
@@ -80,7 +82,8 @@ class Flight:
         self._reference = Reference(common, self._float)
         dtype = np.float64 if self._float else np.int64
         self._inp = np.zeros(inputs.SIZE, dtype)
-        self._wire = np.zeros(inputs.SIZE, np.int64)
+        self._wire = [0] * inputs.SIZE
+        self._words = np.zeros(inputs.SIZE, np.int64)
         self._out = np.zeros(4, dtype)
         self._sent: list[tuple[int, int, int]] = [(0, 0, 0)] * (self._delay + 1)  # newest last
         self._row = 0
@@ -161,9 +164,9 @@ class Flight:
     def _fill(self, tick: int, sample: Sample | None) -> None:
         """The law's inputs in wire units; what acts now is the lab's word, without it the board's own last command."""
         wire = self._wire
-        wire[inputs.FRESH] = sample is not None
+        wire[inputs.FRESH] = int(sample is not None)
         wire[inputs.GOOD_RUN] = self._good_run
-        wire[inputs.APPLIED_KNOWN] = sample is not None
+        wire[inputs.APPLIED_KNOWN] = int(sample is not None)
         wire[inputs.TICK] = tick
         wire[inputs.SETPOINT] = self._setpoint
         if sample is None:
@@ -174,10 +177,11 @@ class Flight:
             for place, reading in zip(inputs.READINGS, sample.readings, strict=True):
                 if reading is not None:
                     wire[place] = reading.values
+        self._words[:] = wire
         if self._float:
-            np.multiply(wire, self._si, out=self._inp)
+            np.multiply(self._words, self._si, out=self._inp)
         else:
-            self._inp[:] = wire
+            self._inp[:] = self._words
 
     def _control(self, tick: int, notices: list[Event]) -> tuple[tuple[int, int, int], int]:
         """Reference model, then law, then the wire's own limits."""

@@ -46,7 +46,7 @@ from protocol.messages import (
 from protocol.refusals import BadCrc, BadLength, BadValue, BadVersion, CannotPack, TooLong, TooShort, UnknownType
 from protocol.refusals import BadPacket as BadPacket
 
-__all__ = ["BadPacket", "has_right_crc", "pack", "unpack"]
+__all__ = ["BadPacket", "has_right_crc", "pack", "unpack", "unpack_checked"]
 __all__ += messages.__all__
 
 
@@ -78,6 +78,11 @@ def unpack(packet: bytes) -> Packet:
         raise TooLong(len(packet))
     if not has_right_crc(packet):
         raise BadCrc(packet)
+    return unpack_checked(packet)
+
+
+def unpack_checked(packet: bytes) -> Packet:
+    """The same for a packet whose length and CRC are known to be right, as every decoder's are."""
     version, type_, sequence, tick = _HEADER.unpack_from(packet)
     if version != PROTOCOL_VERSION:
         raise BadVersion(version, PROTOCOL_VERSION)

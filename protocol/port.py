@@ -12,7 +12,19 @@ from dataclasses import dataclass
 
 from protocol.codec import Tap as CandidateTap
 from protocol.codec import decoder_for, encode
-from protocol.frames import BadPacket, Frame, Hello, Packet, Ready, Stop, Tick, Timing, is_housekeeping, pack, unpack
+from protocol.frames import (
+    BadPacket,
+    Frame,
+    Hello,
+    Packet,
+    Ready,
+    Stop,
+    Tick,
+    Timing,
+    is_housekeeping,
+    pack,
+    unpack_checked,
+)
 from protocol.link import Link
 
 Tap = Callable[[str, bytes], object]
@@ -100,7 +112,7 @@ class Port:
     def _take(self, raw: bytes) -> None:
         """One packet with a right CRC: count, check its number, queue it."""
         try:
-            packet = unpack(raw)
+            packet = unpack_checked(raw)
         except BadPacket:
             self._unknown += 1
             return

@@ -198,7 +198,8 @@ class Loop:
 
 def is_finite(motion: Motion) -> bool:
     """No part of the motion is infinite or not a number."""
-    return math.isfinite(sum(sum(part.tolist()) for part in motion[1:]))
+    _, q, w, h, e, r = motion
+    return math.isfinite(sum(q.tolist()) + sum(w.tolist()) + sum(h.tolist()) + sum(e.tolist()) + sum(r.tolist()))
 
 
 def to_lsb(values: Vector, unit: float) -> tuple[int, int, int]:

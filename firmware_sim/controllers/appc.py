@@ -22,12 +22,11 @@ Source: study of paper 004, section 3.1 (there: BEST). Transport delay: exactly 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed, word_of
+from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed
 from firmware_sim.controllers.gain import (
     learn_fixed,
     learn_float,
@@ -351,6 +350,11 @@ class Appc(CompiledLaw):
 
     STATE = STATE
     RANGES = ranges_of(APPC.telemetry)
+    WORDS = tuple(
+        (field + i, lsb)
+        for field, lsb in ((G, 2.0**-28), (P, 2.0**-34), (INNOVATION, math.pi / 2**31), (W, math.pi / 2**35))
+        for i in range(3)
+    )
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
@@ -386,13 +390,3 @@ class Appc(CompiledLaw):
         shifts = [common["torque_bits"] - 28, common["momentum_bits"] - 28]
         scales = torque_scales_fixed(period_us, [p[f"inertia_kgm2_{axis}"] for axis in AXES])
         return [ts, ts_inv, *gains, p["adapt"], p["gyro"], orbit, *shifts, *torque_limits_fixed(common), *scales]
-
-    def telemetry(self) -> list[int]:
-        s: list[Any] = self.state.tolist()
-        fields = (G, P, INNOVATION, W)
-        if self.is_float:
-            lsb = (2.0**-28, 2.0**-34, 2 * math.pi / 2**32, 2 * math.pi / 2**36)
-            words = [word_of(s[f + i], unit) for f, unit in zip(fields, lsb, strict=True) for i in range(3)]
-        else:
-            words = [s[f + i] for f in fields for i in range(3)]
-        return self.in_range(words)

@@ -8,6 +8,7 @@ from typing import ClassVar, NamedTuple, TypeAlias
 
 import numpy as np
 
+from firmware_sim import jit
 from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, div_trunc, shift_round
 from protocol.law_tables import AXES, FORM_FLOAT, Configuration, Word, refusal
 
@@ -46,11 +47,12 @@ class CompiledLaw(ABC):
     """Base of pd, mrac and appc: `state` and `par` are int64 (fixed) or float64 arrays, `step` runs one function.
 
     A law gives STATE, RANGES, `functions` and `compiled` (float step, fixed step, as source and compiled), the
-    parameters, telemetry().
+    parameters, and WORDS or telemetry().
     """
 
     STATE: ClassVar[tuple[Field, ...]]
     RANGES: ClassVar[Ranges]  # of its telemetry words
+    WORDS: ClassVar[tuple[tuple[int, float], ...]] = ()  # each word: its place in the state, LSB of the float form
     functions: ClassVar[tuple[Step, Step]]
     compiled: ClassVar[tuple[Step, Step]]
     has_model: ClassVar[bool] = True
@@ -66,6 +68,10 @@ class CompiledLaw(ABC):
         self.par = np.array(numbers, dtype)
         self.state = np.zeros(size(self.STATE), dtype)
         self._run = self.compiled[0] if self.is_float else self.compiled[1]
+        self._gather = _words_float if self.is_float else _words_fixed
+        self._lsb = np.array([lsb for _, lsb in self.WORDS])
+        self._places = np.array([(place, *limits) for (place, _), limits in zip(self.WORDS, self.RANGES, strict=False)])
+        self._words = np.zeros(len(self.WORDS), np.int64)
         self.initialise(self.state)
 
     @staticmethod
@@ -93,6 +99,13 @@ class CompiledLaw(ABC):
     def warm_up(self, inp: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
         """Compile (or load) the step on copies; the law's state and all arguments stay as they are."""
         self._run(self.state.copy(), self.par, inp.copy(), ref.copy(), out.copy())
+        self.telemetry()
+
+    def telemetry(self) -> list[int]:
+        """Words of TELEMETRY after the common ones, within the ranges of the law's table."""
+        self._gather(self.state, self._places, self._lsb, self._words)
+        words: list[int] = self._words.tolist()
+        return words
 
     def in_range(self, words: Sequence[int]) -> list[int]:
         """Telemetry words within the ranges of the law's table."""
@@ -104,6 +117,24 @@ class CompiledLaw(ABC):
         index = [field.name for field in self.STATE].index(name)
         start = offsets(self.STATE)[index]
         return self.state[start : start + self.STATE[index].length]
+
+
+def words_fixed(state: np.ndarray, places: np.ndarray, lsb: np.ndarray, words: np.ndarray) -> None:
+    """`words`: the state at `places` (rows of index, lowest, highest), limited."""
+    for n in range(len(places)):
+        words[n] = clip(state[places[n, 0]], places[n, 1], places[n, 2])
+
+
+def words_float(state: np.ndarray, places: np.ndarray, lsb: np.ndarray, words: np.ndarray) -> None:
+    """The same in counts of `lsb`; what is not a number becomes the lowest word."""
+    for n in range(len(places)):
+        count = state[places[n, 0]] / lsb[n]
+        words[n] = places[n, 1]
+        if count == count:
+            words[n] = clip(int(np.rint(min(max(count, -2147483648.0), 2147483647.0))), places[n, 1], places[n, 2])
+
+
+_words_fixed, _words_float = jit.compile(words_fixed), jit.compile(words_float)
 
 
 def word_of(value: float, lsb: float) -> int:

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed, word_of
+from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed
 from firmware_sim.fixed import clip, div_trunc, keep32, mul_q, norm_shift, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import NOW, wrap_pi
 from protocol.law_tables import AXES, PD, Configuration
@@ -98,6 +98,7 @@ class Pd(CompiledLaw):
 
     STATE = STATE
     RANGES = ranges_of(PD.telemetry)
+    WORDS = tuple((ERROR + i, math.pi / 2**31) for i in range(3))
     has_model = False
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
@@ -114,9 +115,3 @@ class Pd(CompiledLaw):
         kd = [per_sample_fixed(p[f"kd_{axis}"], p["kd_bits"], common["period_us"]) for axis in AXES]
         par = [*(p[f"kp_{axis}"] for axis in AXES), *(m for m, _ in kd), *torque_limits_fixed(common)]
         return [*par, p["kp_bits"] + 1, *(n for _, n in kd), common["torque_bits"] - 28]
-
-    def telemetry(self) -> list[int]:
-        words = self.state[ERROR : ERROR + 3].tolist()
-        if self.is_float:
-            words = [word_of(x, math.pi / 2**31) for x in words]
-        return self.in_range(words)

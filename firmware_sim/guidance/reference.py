@@ -151,7 +151,23 @@ def _advance_axis_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: 
         state[RATE_NOW + i], state[RATE_NEXT + i] = rate, rate_new
 
 
+def words_fixed(state: np.ndarray, words: np.ndarray) -> None:
+    """`words`: reference[3] in bam, reference_rate[3] in bam/sample, from the state in its own units."""
+    for i in range(3):
+        words[i] = wrap32(state[NOW + i])
+        words[3 + i] = sat32(shift_round(state[RATE_NOW + i], 4))
+
+
+def words_float(state: np.ndarray, words: np.ndarray) -> None:
+    """The same from radians."""
+    for i in range(3):
+        words[i] = wrap32(int(np.rint(state[NOW + i] * 2147483648.0 / math.pi)))
+        rate = int(np.rint(state[RATE_NOW + i] * 34359738368.0 / math.pi))
+        words[3 + i] = sat32(shift_round(rate, 4))
+
+
 _run_fixed, _run_float = jit.compile(advance_fixed), jit.compile(advance_float)
+_words_fixed, _words_float = jit.compile(words_fixed), jit.compile(words_float)
 
 
 def parameters_fixed(common: Mapping[str, int]) -> list[int]:
@@ -197,6 +213,7 @@ class Reference:
         self.state = np.zeros(SIZE, dtype)
         self.state[LEAD] = common["reference_lead"]
         self._run = _run_float if is_float else _run_fixed
+        self._words_of, self._words = _words_float if is_float else _words_fixed, np.zeros(6, np.int64)
 
     def advance(self, inp: np.ndarray) -> bool:
         """One tick, before the law's step; True if the reference started at this tick's reading (its first)."""
@@ -204,8 +221,5 @@ class Reference:
 
     def words(self) -> tuple[int, ...]:
         """reference[3] in bam and reference_rate[3] in bam/sample, for TELEMETRY."""
-        now, rate = self.state[NOW : NOW + 3].tolist(), self.state[RATE_NOW : RATE_NOW + 3].tolist()
-        if self._float:
-            now = [round(y * 2**31 / math.pi) for y in now]
-            rate = [round(v * 2**35 / math.pi) for v in rate]
-        return (*(wrap32(y) for y in now), *(sat32(shift_round(v, 4)) for v in rate))
+        self._words_of(self.state, self._words)
+        return tuple(self._words.tolist())
