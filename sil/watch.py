@@ -28,6 +28,9 @@ class Watch:
     def event(self, tick: int, code: int, a: int, b: int, origin: int = 0) -> None:
         """Something happened, in the numbers of protocol.events; origin 0: the laboratory says so, 1: the board."""
 
+    def close(self) -> None:
+        """Leave the terminal as it was found; called on a watch that failed."""
+
     def stage(self, name: str) -> None:
         """`start`, `run`, `seal`."""
 
@@ -59,6 +62,8 @@ class Guarded(Watch):
         try:
             getattr(self._watch, name)(*arguments)
         except Exception as error:
+            with contextlib.suppress(Exception):
+                self._watch.close()
             self._watch = None
             with contextlib.suppress(OSError, ValueError):  # standard error may be what failed
                 print(f"view: {type(error).__name__}: {error}; the run goes on without it", file=sys.stderr, flush=True)

@@ -24,10 +24,11 @@ def test_a_watch_that_raises_does_not_end_the_run(broken: str, tmp_path: Path, c
 
     watch = Watch()
     setattr(watch, broken, raising)
+    watch.close = lambda: calls.append("close")  # type: ignore[method-assign]
     # an answer delay beyond the period gives events
     sets = ["duration_s=10", "require=[]", "board=inproc", "answer_delay_s=0.6", "expect_missed=true"]
     summary = run_scenario(load_scenario("appc-rs232", sets), tmp_path / "run", watch)
     assert summary["exit_code"] == 0 and len(open_run(tmp_path / "run")) == 20
     said = capsys.readouterr().err
-    assert calls == [broken], "called again after it failed"
+    assert calls == [broken, "close"], "called again after it failed, or not closed"
     assert said == "view: TypeError: cannot draw; the run goes on without it\n"
