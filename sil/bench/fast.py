@@ -43,7 +43,8 @@ class FastLoop:
             for repeat in range(self._repeats(plan)):
                 for priority in priorities():
                     what = f"{policy(priority)}, repeat {repeat + 1} of {self._repeats(plan)}"
-                    one_pair(plan, book, waker, priority, what, Path(name) / f"{priority}-{repeat}")
+                    with flights.left_out(book, what):
+                        one_pair(plan, book, waker, priority, what, Path(name) / f"{priority}-{repeat}")
 
     @staticmethod
     def _repeats(plan: Plan) -> int:

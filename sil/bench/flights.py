@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from protocol.frames import STOP_DONE
+from sil.bench.book import Book
 from sil.bench.children import ChildFailed, run_child, sil_command
 from sil.boards.process import child_environment
 from sil.rig import assemble
@@ -41,11 +43,31 @@ def unrecorded(of: Scenario, recorder: Recorder) -> tuple[int, float]:
 
 
 def recorded(of: Scenario, folder: Path) -> dict[str, Any]:
-    """The summary of a run of this process into `folder`. A wish to end it (Ctrl-C) ends the series."""
+    """The summary of a run of this process into `folder`. A wish to end it (Ctrl-C) ends the series.
+
+    Raises ChildFailed as whole() does.
+    """
     summary = run_scenario(of, folder)
     if summary["reason"] == "interrupted":
         raise KeyboardInterrupt
-    return summary
+    return whole(summary)
+
+
+def whole(summary: dict[str, Any]) -> dict[str, Any]:
+    """This summary. Raises ChildFailed if the run was cut short: few ticks have few misses, and that is no merit."""
+    if summary["reason"] == "finished" and not summary["failure"]:
+        return summary
+    got = f"{summary['reason']} after {summary['ticks']} ticks"
+    raise ChildFailed(": ".join(filter(None, (f"sil run: expected it to finish, got {got}", summary["failure"]))))
+
+
+@contextmanager
+def left_out(book: Book, what: str) -> Iterator[None]:
+    """A repeat in which something failed is noted and has no figures; the next one can be measured all the same."""
+    try:
+        yield
+    except ChildFailed as error:
+        book.note(f"{what}, left out: {error}")
 
 
 class Paced(NamedTuple):
@@ -56,7 +78,7 @@ class Paced(NamedTuple):
 
 
 def paced(file: Path, folder: Path, keys: Sequence[str], wall_s: float) -> Paced:
-    """`sil run FILE` in a process of its own, as a user starts it. Raises ChildFailed."""
+    """`sil run FILE` in a process of its own, as a user starts it. Raises ChildFailed, also for a run cut short."""
     sets = [part for key in keys for part in ("--set", key)]
     command = sil_command("run", str(file), "--out", str(folder), "--json", *sets)
     said = run_child(command, wall_s + START_S, EXIT_CODES, child_environment())
@@ -64,6 +86,9 @@ def paced(file: Path, folder: Path, keys: Sequence[str], wall_s: float) -> Paced
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ChildFailed(f"sil run: {said.last_words}") from None
-    records = JournalReader(folder / "run.journal")
-    late = [read_timing(record.payload)[0] * 1e-3 for record in records if record.kind == Kind.TIMING]
-    return Paced(summary, late)
+    return Paced(whole(summary), lateness_us(folder / "run.journal"))
+
+
+def lateness_us(journal: Path) -> list[float]:
+    """How late each tick of this log woke up, in us."""
+    return [read_timing(record.payload)[0] * 1e-3 for record in JournalReader(journal) if record.kind == Kind.TIMING]

@@ -67,7 +67,8 @@ class Wakeup:
                     for pace in PACES:
                         what = f"{pace.rate_hz} Hz, {policy(priority)}, repeat {repeat + 1} of {plan.repeats}"
                         folder = Path(name) / f"{pace.rate_hz}-{priority}-{repeat}"
-                        one_round(plan, book, waker, pace, priority, what, folder)
+                        with flights.left_out(book, what):
+                            one_round(plan, book, waker, pace, priority, what, folder)
 
 
 def priorities() -> tuple[int, ...]:
