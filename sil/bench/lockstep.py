@@ -24,7 +24,7 @@ from pathlib import Path
 from protocol.frames import Type
 from sil.bench import flights
 from sil.bench.book import Book, Plan
-from sil.bench.children import cpus, end
+from sil.bench.children import ChildFailed, cpus, end
 from sil.runs import Run, open_run
 from sil.scenario import Scenario
 
@@ -35,7 +35,7 @@ WARM_UP = 200
 CHILD = """
 import os, sys, tty
 os.sched_setaffinity(0, {int(sys.argv[4])})
-fd = os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY)
+fd = int(sys.argv[1])
 tty.setraw(fd)
 asked, answer = int(sys.argv[2]), bytes(int(sys.argv[3]))
 os.write(fd, b"!")
@@ -112,11 +112,12 @@ def pinned(cpu: int) -> Iterator[None]:
 
 
 def ping_pong_us(up: int, down: int, exchanges: int, childs_cpu: int) -> float:
-    """Median of one exchange, up bytes there and down bytes back, in us."""
+    """Median of one exchange, up bytes there and down bytes back, in us. Raises ChildFailed."""
     master, slave = pty.openpty()
     tty.setraw(slave)
-    arguments = [os.ttyname(slave), str(up), str(down), str(childs_cpu)]
-    child = subprocess.Popen([sys.executable, "-c", CHILD, *arguments], start_new_session=True)
+    command = [sys.executable, "-c", CHILD, *map(str, (slave, up, down, childs_cpu))]
+    child = subprocess.Popen(command, start_new_session=True, pass_fds=(slave,))
+    os.close(slave)  # it is the child's alone now: when that dies, a read here fails instead of waiting for ever
     try:
         os.read(master, 1)
         request, times = bytes(up), []
@@ -127,9 +128,10 @@ def ping_pong_us(up: int, down: int, exchanges: int, childs_cpu: int) -> float:
             while got < down:
                 got += len(os.read(master, 65536))
             times.append(time.perf_counter_ns() - began)
+    except OSError as error:
+        raise ChildFailed(f"{BESIDE}: its other end is gone: {error.strerror}") from None
     finally:
         os.close(master)
-        os.close(slave)
         end(child)
     return statistics.median(times[WARM_UP:]) * 1e-3
 

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from sil.bench import loop, plant
+from sil.bench import lockstep, loop, plant
 from sil.bench.book import Book, Plan
-from sil.bench.children import cpus
+from sil.bench.children import ChildFailed, cpus
 from sil.bench.codec import bare, frames_of_a_tick, ours
 from sil.bench.lockstep import ping_pong_us
 from sil.bench.series import run_series
@@ -27,6 +28,24 @@ def test_a_ping_pong_ends_with_its_child_gone() -> None:
     for _ in range(3):
         assert ping_pong_us(79, 150, 20, cpus()[1]) > 0.0
     assert children() == before
+
+
+@pytest.mark.parametrize("last_words", ["", "!"])
+def test_a_ping_pong_ends_when_its_child_dies(last_words: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before its first byte or after it. The alarm ends a wait that would be for ever."""
+
+    def too_long(*_: object) -> None:
+        raise AssertionError("still waiting for a child that is gone")
+
+    monkeypatch.setattr(lockstep, "CHILD", f"import os, sys; os.write(int(sys.argv[1]), b'{last_words}')")
+    before = signal.signal(signal.SIGALRM, too_long)
+    signal.alarm(20)
+    try:
+        with pytest.raises(ChildFailed, match="bare ping-pong: its other end is gone"):
+            ping_pong_us(79, 150, 20, cpus()[1])
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def children() -> list[str]:
