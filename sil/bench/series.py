@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import signal
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from typing import Any, Protocol
+from collections.abc import Sequence
+from typing import Protocol
 
 from sil.bench import BENCHES, machine
 from sil.bench.book import Book, Plan
 from sil.plugins import load
+from sil.stopping import terminated_like_interrupted
 from sil.trouble import SilError, UsageError
 
 
@@ -62,7 +61,7 @@ def run_series(names: Sequence[str], plan: Plan, watch: Watch | None = None) -> 
     books: list[Book] = []
     plan.doing = watch.doing
     try:
-        with _terminated_like_interrupted():
+        with terminated_like_interrupted():
             for name, bench in benches.items():
                 books.append(Book(name, bench.about))
                 watch.bench(name)
@@ -89,27 +88,3 @@ def _measure(bench: Bench, plan: Plan, book: Book) -> None:
     finally:
         book.wall_s = time.monotonic() - began
         book.load = before, machine.load()
-
-
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM, and SIGHUP unless it is ignored (nohup), end the series as Ctrl-C does.
-
-    Outside the main thread Python installs no handlers; then nobody asks.
-    """
-
-    def interrupt(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    before: dict[signal.Signals, Any] = {}
-    try:
-        for number in (signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                before[number] = signal.signal(number, interrupt)
-    except ValueError:
-        before.clear()
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

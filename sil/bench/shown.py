@@ -92,6 +92,7 @@ def show(books: Sequence[Book], machine: Mapping[str, Any], interrupted: bool) -
 
 def show_book(console: Any, book: Book) -> None:
     """Headline, table, notes of one bench."""
+    from rich.markup import escape
     from rich.padding import Padding
 
     load = f"load {book.load[0]:g} to {book.load[1]:g}"
@@ -99,9 +100,9 @@ def show_book(console: Any, book: Book) -> None:
     if any(line.ours for line in book.lines):
         console.print(Padding(table_of(book.lines), (0, 0, 0, 2)))
     if book.skipped:
-        console.print(f"  [yellow]skipped[/]: {book.skipped}")
+        console.print(f"  [yellow]skipped[/]: {escape(book.skipped)}")
     for note in book.notes:
-        console.print(f"  [dim]note: {note}[/]")
+        console.print(f"  [dim]note: {escape(note)}[/]")
 
 
 def table_of(lines: Sequence[Line]) -> Any:

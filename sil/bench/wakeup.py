@@ -1,8 +1,10 @@
 """Bench `wakeup`: how late our ticks wake up, beside cyclictest at the same rate, policy, priority and CPU.
 
 ours    a whole `sil run` in real time over a pty with law pd: lateness of every tick after the first, from its log.
-asleep  the same with `clock.spin_us: 0`. By default a run does not sleep the last stretch before a deadline but looks
-        at the clock, so that it is on time although a wake-up is not; asleep it does exactly what cyclictest does.
+        By default it does not sleep the last stretch before a deadline (`clock.spin_us`) but looks at the clock, so
+        that it is on time although a wake-up is not. This is what a user gets, and the table says so.
+asleep  the same with `clock.spin_us: 0`: exactly what cyclictest does, so the comparison of like with like. The goal
+        is the same for both.
 beside  cyclictest with as many wake-ups (sil.bench.wakers); it does nothing else, ours has a tick of work between two.
 
 Each repeat runs one after the other. 1000 Hz is T_s 0.01 s at ten times real time: the wall clock's period counts here,
@@ -19,10 +21,12 @@ from sil.bench import flights
 from sil.bench.book import Book, Goal, Plan
 from sil.bench.children import cpus, may_use_fifo
 from sil.bench.wakers import Waker, find_waker, percentiles
+from sil.scenario_sections import Clock
 
 PRIORITY = 50
 RATIO_P99 = 1.5
 JUDGED_FROM_HZ = 100  # below, a repeat has too few wake-ups for a p99
+SPINNING, ASLEEP = f"last {Clock().spin_us} us not slept", "asleep"
 START_S = 2.0  # of a `sil run` and its board
 NO_FIFO = "SCHED_FIFO is not permitted here (run as root, or set rtprio in /etc/security/limits.conf): left out"
 
@@ -51,7 +55,10 @@ PACES = (
 class Wakeup:
     """The bench `wakeup`."""
 
-    about = "wake-ups of a run in real time over a pty, beside cyclictest at the same rate, priority and CPU"
+    about = (
+        f"wake-ups of a run in real time over a pty, as it is by default ({SPINNING}) and {ASLEEP} to the deadline, "
+        "beside cyclictest, which sleeps, at the same rate, priority and CPU"
+    )
 
     def expected_s(self, plan: Plan) -> float:
         each = sum(3 * pace.ticks(plan) / pace.rate_hz + 2 * START_S for pace in PACES)
@@ -87,9 +94,9 @@ def one_round(plan: Plan, book: Book, waker: Waker, pace: Pace, priority: int, w
     file = scenario_file(folder, pace.period_s, ticks)
     keys = clock_keys(pace.clock, priority, lab, board)
     found: dict[str, list[float]] = {}
-    for name, more in (("sil", []), ("asleep", ["clock.spin_us=0"])):
-        plan.doing(f"wakeup: sil run{' asleep' if more else ''}, {what}")
-        run = flights.paced(file, folder / name, [*keys, *more], ticks / pace.rate_hz)
+    for name, more in ((SPINNING, []), (ASLEEP, ["clock.spin_us=0"])):
+        plan.doing(f"wakeup: sil run {name}, {what}")
+        run = flights.paced(file, folder / name.replace(" ", "-"), [*keys, *more], ticks / pace.rate_hz)
         found[name] = run.lateness_us[1:]
         timing = run.summary["timing"]
         told = {key: timing[key] for key in ("late_ticks", "causes", "granted") if key in timing}
@@ -99,8 +106,8 @@ def one_round(plan: Plan, book: Book, waker: Waker, pace: Pace, priority: int, w
     plan.doing(f"wakeup: {waker.name}, {what}")
     beside = waker.lateness_us(1_000_000 // pace.rate_hz, ticks, priority, lab)
     case = f"{pace.rate_hz} Hz {policy(priority)}"
-    enter(book, case, waker.name, found["sil"], beside, judged=pace.rate_hz >= JUDGED_FROM_HZ)
-    enter(book, f"{case} asleep", waker.name, found["asleep"], beside, judged=False)
+    for name, late_us in found.items():
+        enter(book, f"{case} {name}", waker.name, late_us, beside, judged=pace.rate_hz >= JUDGED_FROM_HZ)
     pool(book, f"{case}, {waker.name}", beside)
 
 

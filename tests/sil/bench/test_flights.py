@@ -8,9 +8,10 @@ from typing import Any
 
 import pytest
 
-from sil.bench import fast, flights, wakeup
-from sil.bench.book import Book, Plan
+from sil.bench import fast, flights, loop, wakeup
+from sil.bench.book import Book, Goal, Plan
 from sil.bench.children import ChildFailed, Said
+from sil.bench.shown import goals_text
 
 WHOLE = {"reason": "finished", "failure": "", "ticks": 4, "link": {"missed": 0, "real_misses": 0}}
 TIMING = {"answer_us": {"p99": 1.0, "max": 2.0}, "granted": None}
@@ -71,6 +72,38 @@ def test_a_run_of_this_process_counts_only_when_whole(monkeypatch: pytest.Monkey
         flights.recorded(of, tmp_path)
     with pytest.raises(KeyboardInterrupt):
         flights.recorded(of, tmp_path)
+
+
+def test_both_ways_to_a_deadline_are_judged_and_named(ends: list[dict[str, Any]]) -> None:
+    """cyclictest sleeps; a goal met only by a run that does not would say nothing about wake-ups."""
+    ends.append({})
+    book = Book("wakeup")
+    wakeup.Wakeup().measure(Plan(1, quick=True), book)
+    judged = {line.case: line.goal for line in book.lines if line.met is not None}
+    goal = Goal(wakeup.RATIO_P99)
+    assert judged == {
+        "100 Hz ordinary last 100 us not slept, p99": goal,
+        "100 Hz ordinary asleep, p99": goal,
+        "1000 Hz ordinary last 100 us not slept, p99": goal,
+        "1000 Hz ordinary asleep, p99": goal,
+    }
+    assert goals_text([book]) == "goals: 4 of 4 met"
+    assert "last 100 us not slept" in wakeup.Wakeup.about
+
+
+@pytest.mark.parametrize("compared", [False, True])
+def test_the_loops_goal_of_its_own_stands_with_and_without_basilisk(
+    compared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten times Basilisk and not 5000 times real time: both must be seen."""
+    monkeypatch.setattr(loop, "basilisk_speed", lambda *_: 400.0 if compared else None)
+    monkeypatch.setattr(flights, "recorded", lambda *_: {"timing": {"times_real_time": 500.0}})
+    monkeypatch.setattr(flights, "unrecorded", lambda of, _: (4000, of.period_s))
+    book = Book("loop")
+    loop.WholeLoop().measure(Plan(2, quick=True), book)
+    goals = [(line.goal.text(), line.met) for line in book.lines if line.goal and "pd float" in line.case]
+    assert goals == [(">= 5", True)] * compared + [("sil >= 5000", False)]
+    assert all(len(line.ours) == 2 for line in book.lines)
 
 
 @pytest.mark.parametrize("bench", [fast.FastLoop(), wakeup.Wakeup()], ids=["fast", "wakeup"])

@@ -136,8 +136,8 @@ def test_a_child_does_not_outlive_its_time() -> None:
 def test_no_child_outlives_a_bench_that_is_ended(number: int, tmp_path: Path) -> None:
     """SIGKILL leaves the bench no time for anything; the kernel ends the child."""
     program = (
-        "from sil.bench import series\nfrom sil.bench.children import run_child\n"
-        "with series._terminated_like_interrupted():\n"
+        "from sil.bench.children import run_child\nfrom sil.stopping import terminated_like_interrupted\n"
+        "with terminated_like_interrupted():\n"
         "    run_child(['sh', '-c', 'echo $$ > pid; exec sleep 60'], 90.0)\n"
     )
     parent = subprocess.Popen([sys.executable, "-c", program], cwd=tmp_path, stderr=subprocess.DEVNULL)

@@ -58,6 +58,14 @@ def test_a_bench_that_could_not_run_says_why() -> None:
     assert any("skipped: neither cyclictest" in line for line in shown(book, 160))
 
 
+def test_brackets_of_a_note_or_a_reason_are_shown() -> None:
+    """They are no markup: without `[bench]` the command would install something else."""
+    book = Book("loop", "about", skipped="no 'a[skipped]'", notes=["pip install 'attitude-sil[bench]'"])
+    text = "".join(shown(book, 160))
+    assert "'attitude-sil[bench]'" in text
+    assert "'a[skipped]'" in text
+
+
 def test_goals_are_counted_and_the_missed_ones_named() -> None:
     met = Book("law")
     met.line("appc, float", "us", "", Goal(5.0, of="ours")).add(1.0)
