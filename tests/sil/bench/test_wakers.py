@@ -46,7 +46,7 @@ def test_cyclictest_comes_first_then_the_compiler_then_nothing(monkeypatch: pyte
     monkeypatch.setattr(wakers, "Sleeper", lambda compiler: compiler)
     assert isinstance(find_waker(), Cyclictest)
     del here["cyclictest"]
-    assert find_waker() == "/usr/bin/cc"
+    assert str(find_waker()) == "/usr/bin/cc"
     del here["cc"]
     with pytest.raises(Unavailable, match="apt-get install rt-tests"):
         find_waker()
