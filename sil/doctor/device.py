@@ -5,7 +5,7 @@ from __future__ import annotations
 import grp
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +19,7 @@ RELOAD = "sudo udevadm control --reload-rules"
 USUAL_PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*")
 # Programs that open every new serial port to see what it is, and what keeps them from it.
 CURIOUS = {"ModemManager": "sudo systemctl disable --now ModemManager", "brltty": "sudo apt remove brltty"}
+OURS = ("sil", "firmware_sim")  # programs that a command may end
 SHOWN_PORTS = 6
 SHOWN_COMMAND = 70  # characters
 
@@ -40,11 +41,14 @@ class Device:
 
 
 class Opener(NamedTuple):
-    """A process that has the device open: its name, and the command it was started with."""
+    """A process that has the device open: its name, the command it was started with, and whether it is a `sil` of
+    this user's.
+    """
 
     pid: int
     name: str
     command: str
+    ours: bool
 
 
 def find(around: Surroundings, path: str, status: Status = os.stat) -> Device | None:
@@ -60,7 +64,7 @@ def find(around: Surroundings, path: str, status: Status = os.stat) -> Device | 
 
 
 def presence(around: Surroundings, path: str, device: Device | None) -> Finding:
-    """Whether it is there and a character device; where not, which ports are."""
+    """Whether it is there and a terminal device; where not, which ports are."""
     ports = ports_here(around)
     known = f"ports here: {', '.join(ports)}" if ports else "there is no USB serial port here at all"
     data = {"path": path, "ports": list(ports)}
@@ -69,10 +73,27 @@ def presence(around: Surroundings, path: str, device: Device | None) -> Finding:
         return Finding(PROBLEM, f"{path} does not exist", advice, ("sudo dmesg --follow",), data=data)
     if not stat.S_ISCHR(device.status.st_mode):
         return Finding(PROBLEM, f"{path} is no serial device but {_kind(device.status.st_mode)}", known, data=data)
+    if not _is_terminal(around, device.status.st_rdev):
+        found = f"{path} is no serial device but one that the kernel lists under no terminal driver"
+        return Finding(PROBLEM, found, known, data=data)
     also = f" -> {device.real}" if device.real != path else ""
     return Finding(
         OK, f"{path}{also}{', a pseudo-terminal' if device.is_pty else ''}", data={**data, "real": device.real}
     )
+
+
+def _is_terminal(around: Surroundings, rdev: int) -> bool:
+    """By the kernel's table of drivers: opening it to ask would raise DTR, which resets many a board.
+
+    True where there is no such table.
+    """
+    table = around.text("/proc/tty/drivers").splitlines()
+    for row in table:
+        major, minors = row.split()[2:4]
+        first, _, last = minors.partition("-")
+        if os.major(rdev) == int(major) and int(first) <= os.minor(rdev) <= int(last or first):
+            return True
+    return not table
 
 
 def ports_here(around: Surroundings) -> tuple[str, ...]:
@@ -145,7 +166,7 @@ def openers(around: Surroundings, device: Device, me: int) -> Finding:
     if others:
         named = ", ".join(f"{other.command or other.name} (pid {other.pid})" for other in others)
         cures = tuple(dict.fromkeys(CURIOUS[other.name] for other in others if other.name in CURIOUS))
-        ends = tuple(f"kill {other.pid}" for other in others if other.name not in CURIOUS)
+        ends = tuple(f"kill {other.pid}" for other in others if other.ours)
         advice = "not talking to the board: two readers would share its bytes, and HELLO would end the other's session"
         if any("firmware_sim" in other.command for other in others):
             advice, ends = "that is a board on this very end of the cable: the doctor needs the other end", ()
@@ -171,9 +192,28 @@ def who_has(around: Surroundings, real: str, me: int) -> tuple[list[Opener], int
             continue
         if any(_target(handle) == real for handle in handles):
             name = around.text(f"/proc/{process.name}/comm") or "?"
-            command = around.text(f"/proc/{process.name}/cmdline").replace("\0", " ").strip()
-            found.append(Opener(int(process.name), name, _shortened(command)))
+            words = around.text(f"/proc/{process.name}/cmdline").rstrip("\0").split("\0")
+            ours = _owner(process) == os.getuid() and _is_sil(words)
+            found.append(Opener(int(process.name), name, _shortened(" ".join(words)), ours))
     return found, unseen
+
+
+def _owner(process: Path) -> int | None:
+    try:
+        return process.stat().st_uid
+    except OSError:  # it ended meanwhile
+        return None
+
+
+def _is_sil(words: Sequence[str]) -> bool:
+    """Whether this command is the laboratory or its board: `sil ...`, `python .../sil ...`, `python -m sil ...`."""
+    started = [*words, ""]
+    if not Path(started[0]).name.startswith("python"):
+        return Path(started[0]).name in OURS
+    if "-m" in started:
+        return started[started.index("-m") + 1] in OURS
+    script = next((word for word in started[1:] if not word.startswith("-")), "")
+    return Path(script).name in OURS
 
 
 def _shortened(command: str) -> str:

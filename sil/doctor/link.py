@@ -69,8 +69,10 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
     except LinkError as error:
         if str(error).startswith("link:"):
             raise
-        commands = (f"sudo fuser -v {path}",) if device is not None else ()
-        yield Finding(PROBLEM, str(error), "who has it open, of all users:", commands, check="open")
+        found = Finding(PROBLEM, str(error), check="open")
+        if device is not None:
+            found = found._replace(advice="who has it open, of all users:", commands=(f"sudo fuser -v {path}",))
+        yield found
         return
     baud = link.baud if isinstance(link, SerialLink) and device is not None and not device.is_pty else None
     answered = False

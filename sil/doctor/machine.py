@@ -9,14 +9,16 @@ import re
 import resource
 import zlib
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from sil.doctor.findings import NOTE, OK, Finding, Surroundings, size_text, user_name
 
 PR_GET_TIMERSLACK = 30
 CAP_IPC_LOCK, CAP_SYS_NICE = 14, 23
 GOOD_CLOCKS = ("tsc", "kvm-clock", "arch_sys_counter", "hyperv_clocksource_tsc_page", "riscv_clocksource")
-TRIED_PRIORITY = 50
+TRIED_PRIORITY, HIGHEST_PRIORITY = 50, 99
+CGROUPS = "/sys/fs/cgroup"
+USUAL_RUNTIME_US, USUAL_PERIOD_US = 950_000, 1_000_000  # the kernel's own
 LIMITS = "/etc/security/limits.d/attitude-sil.conf"
 Tries = Callable[[int], OSError | None]
 
@@ -55,11 +57,27 @@ def _governors(around: Surroundings) -> list[str]:
 
 
 def _quota(around: Surroundings) -> float | None:
-    """CPUs that the control group allows, None for all."""
-    words = around.text("/sys/fs/cgroup/cpu.max").split()
-    if len(words) != 2 or not (words[0].isdigit() and words[1].isdigit()) or int(words[1]) == 0:
-        return None
-    return int(words[0]) / int(words[1])
+    """CPUs that the control groups allow us, the tightest of those we are in; None for all."""
+    allowed = []
+    for folder in _control_groups(around):
+        words = around.text(f"{folder}/cpu.max").split()  # version 2
+        words = words or [around.text(f"{folder}/cpu.cfs_{name}_us") for name in ("quota", "period")]
+        if len(words) == 2 and words[0].isdigit() and words[1].isdigit() and int(words[1]) > 0:
+            allowed.append(int(words[0]) / int(words[1]))
+    return min(allowed, default=None)
+
+
+def _control_groups(around: Surroundings) -> Iterator[str]:
+    """Folders of our group and all above it, of both versions; a container may see only the top."""
+    yield from (CGROUPS, f"{CGROUPS}/cpu")
+    for line in around.text("/proc/self/cgroup").splitlines():
+        _, controllers, path = [*line.split(":", 2), "", ""][:3]
+        if controllers and "cpu" not in controllers.split(","):
+            continue
+        top = f"{CGROUPS}/cpu" if controllers else CGROUPS
+        while path.strip("/"):
+            yield top + path
+            path = path.rpartition("/")[0]
 
 
 def kernel(around: Surroundings) -> Finding:
@@ -70,12 +88,25 @@ def kernel(around: Surroundings) -> Finding:
     runtime = around.number("/proc/sys/kernel/sched_rt_runtime_us")
     data = {"release": release, "preemption": model, "sched_rt_runtime_us": runtime}
     found = f"{release}, preemption: {model}"
+    advices, commands = [], ()
     if model.startswith(("none", "voluntary")):
-        advice = (
+        advices.append(
             "a long system call delays wake-ups by milliseconds; for real time boot with preempt=full, or PREEMPT_RT"
         )
-        return Finding(NOTE, found, advice, data=data)
-    return Finding(OK, found, data=data)
+    if runtime is not None and runtime != USUAL_RUNTIME_US:
+        found += f", sched_rt_runtime_us {runtime}"
+        advices.append(_runtime_advice(around, runtime))
+        commands = (f"sudo sysctl kernel.sched_rt_runtime_us={USUAL_RUNTIME_US}",)
+    return Finding(NOTE if advices else OK, found, "; ".join(advices), commands, data=data)
+
+
+def _runtime_advice(around: Surroundings, runtime_us: int) -> str:
+    """What it means that real-time processes may take so much of each period; -1: all of it."""
+    period_us = around.number("/proc/sys/kernel/sched_rt_period_us") or USUAL_PERIOD_US
+    if not 0 <= runtime_us < period_us:
+        return "a real-time process that hangs stops its CPU for good; the kernel's own limit is"
+    share = f"{runtime_us / period_us:.3g} of a CPU"
+    return f"real-time processes are stopped when they had {share}; the kernel's own limit is"
 
 
 def _preemption(around: Surroundings, version: str) -> str:
@@ -156,23 +187,31 @@ def real_time(around: Surroundings) -> Finding:
 
 
 def try_fifo(priority: int) -> OSError | None:
-    """SCHED_FIFO for this thread for a moment; the kernel's refusal, or None."""
+    """SCHED_FIFO for this thread for a moment, as a run asks for it; the kernel's refusal, or None."""
+    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError as error:
         return error
-    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    os.sched_setscheduler(0, before | os.SCHED_RESET_ON_FORK, parameters)  # an ordinary user may not clear that flag
     return None
 
 
 def judge_real_time(around: Surroundings, limit: int, tries: Tries) -> Finding:
     """limit: RLIMIT_RTPRIO. tries(priority): the kernel's refusal or None."""
-    refusal = tries(TRIED_PRIORITY)
-    named = "unlimited" if limit == resource.RLIM_INFINITY else str(limit)
-    data = {"granted": refusal is None, "rtprio": named, "capability": _capable(around, CAP_SYS_NICE)}
+    capable, unlimited = _capable(around, CAP_SYS_NICE), limit == resource.RLIM_INFINITY
+    highest = HIGHEST_PRIORITY if capable or unlimited else max(1, min(limit, HIGHEST_PRIORITY))
+    refusal = tries(min(TRIED_PRIORITY, highest))
+    named = "unlimited" if unlimited else str(limit)
+    data = {
+        "granted": refusal is None,
+        "highest": highest if refusal is None else None,
+        "rtprio": named,
+        "capability": capable,
+    }
     if refusal is None:
-        why = "CAP_SYS_NICE" if _capable(around, CAP_SYS_NICE) else f"RLIMIT_RTPRIO {named}"
-        return Finding(OK, f"SCHED_FIFO granted ({why})", data=data)
+        why = "CAP_SYS_NICE" if capable else f"RLIMIT_RTPRIO {named}"
+        return Finding(OK, f"SCHED_FIFO granted, clock.priority up to {highest} ({why})", data=data)
     found = f"SCHED_FIFO refused ({refusal.strerror}; RLIMIT_RTPRIO {named}): clock.priority has no effect"
     advice, commands = _permit(around, "rtprio 99", "--cap-add=SYS_NICE --ulimit rtprio=99")
     return Finding(NOTE, found, advice, commands, data=data)

@@ -64,13 +64,9 @@ def judge_disk(around: Surroundings, free: int, writable: bool) -> Finding:
         advice = "runs go to ./runs: change to a directory of yours, or name one with --out"
         return Finding(NOTE, f"{around.folder} may not be written to", advice, data=data)
     if free < FULL_BYTES:
-        return Finding(
-            PROBLEM, found, "a run would fill it; what takes the room:", ("du -sh runs/* | sort -h",), data=data
-        )
+        return Finding(PROBLEM, found, "a run would fill it; what takes the room:", LARGEST, data=data)
     if free < LOW_BYTES:
-        return Finding(
-            NOTE, found, "enough for short runs; what takes the room:", ("du -sh runs/* | sort -h",), data=data
-        )
+        return Finding(NOTE, found, "enough for short runs; what takes the room:", LARGEST, data=data)
     return Finding(OK, found, data=data)
 
 

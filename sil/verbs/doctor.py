@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Generator, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Generator
+from contextlib import closing
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -48,13 +47,14 @@ def doctor(
     """
     from sil.doctor.findings import PROBLEM
     from sil.doctor.show import Page, Progress
+    from sil.stopping import terminated_like_interrupted
 
     if link is None and try_bauds:
         raise UsageError("--try-bauds: expected a link to try them on, got none; known: --link serial:///dev/X")
     progress, page = Progress(), None if as_json else Page()
     findings: list[Finding] = []
     try:
-        with _terminated_like_interrupted(), closing(_findings(link, round_trips, try_bauds, progress)) as coming:
+        with terminated_like_interrupted(), closing(_findings(link, round_trips, try_bauds, progress)) as coming:
             for finding in coming:
                 progress.clear()
                 findings.append(finding)
@@ -87,17 +87,3 @@ def _findings(link: str | None, round_trips: int, try_bauds: bool, progress: Pro
         yield from examine_link(Examination(link, round_trips, try_bauds), progress.tell)
     except LinkError as error:  # what is wrong with a link that can be opened is a finding; this is no link at all
         raise UsageError(f"--{error}") from None
-
-
-@contextmanager
-def _terminated_like_interrupted() -> Iterator[None]:
-    """SIGTERM ends what is going on as Ctrl-C does: the board is told STOP, the port is closed."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -116,7 +116,7 @@ def test_a_board_process_over_a_cable(cli: Cli, cable: Cable) -> None:
     cli("doctor", "--link", cable.lab, "--round-trips", "5")  # the port is free again, and so is the board
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_interrupted_it_says_stop_and_closes_the_port(cli: Cli, cable: Cable, number: signal.Signals) -> None:
     process = cli.start("doctor", "--link", cable.lab, "--round-trips", "1000000")
     try:

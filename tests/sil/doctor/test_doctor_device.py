@@ -57,6 +57,19 @@ def test_a_file_is_no_serial_device(tmp_path: Path) -> None:
     assert (found.status, found.found) == (PROBLEM, "/dev/ttyUSB0 is no serial device but a file")
 
 
+def test_a_device_that_is_no_terminal_is_a_problem_before_anybody_asks_who_has_it_open(tmp_path: Path) -> None:
+    """Protects: `--link /dev/null`, which half of all processes have open."""
+    drivers = "pty_slave /dev/pts 136 0-1048575 pty:slave\n/dev/tty /dev/tty 5 0 system:/dev/tty\n"
+    around = machine(tmp_path, {"/proc/tty/drivers": drivers})
+
+    def status(rdev: int) -> str:
+        return device.presence(around, "/dev/x", Device("/dev/x", "/dev/x", character_device(rdev=rdev))).status
+
+    assert status(os.makedev(1, 3)) == PROBLEM
+    assert status(os.makedev(5, 1)) == PROBLEM
+    assert status(os.makedev(5, 0)) == status(os.makedev(136, 77)) == OK
+
+
 def test_a_name_by_id_leads_to_the_device(tmp_path: Path) -> None:
     around = machine(tmp_path, {USB0: ""})
     by_id = tmp_path / "dev/serial/by-id/usb-FTDI"
@@ -140,7 +153,33 @@ def test_who_has_it_open_is_named_with_pid_and_command(tmp_path: Path) -> None:
     found = device.openers(around, usb(), me=99)
     assert found.status == PROBLEM
     assert found.found == "open in screen /dev/ttyUSB0 115200 (pid 7)"
-    assert found.commands == ("kill 7",)
+    assert found.commands == (), "somebody else's work: named, never ended"
+
+
+@pytest.mark.parametrize(
+    ("command", "commands"),
+    [
+        ("/venv/bin/python -P -m sil run it", ("kill 7",)),
+        ("/venv/bin/python3.12 /venv/bin/sil run it", ("kill 7",)),
+        ("sil doctor --link /dev/ttyUSB0", ("kill 7",)),
+        ("vim sil", ()),
+        ("python -m serial.tools.miniterm sil", ()),
+        ("python", ()),
+        ("", ()),
+    ],
+)
+def test_only_our_own_programs_come_with_a_kill(tmp_path: Path, command: str, commands: tuple[str, ...]) -> None:
+    """Protects: a command that is pasted without a thought ends nobody else's work."""
+    process(tmp_path, 7, "it", command, USB0)
+    assert device.openers(machine(tmp_path), usb(), me=99).commands == commands
+
+
+def test_a_laboratory_of_another_user_is_only_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Protects: a bench that several people share."""
+    process(tmp_path, 7, "sil", "sil run it", USB0)
+    monkeypatch.setattr(device.os, "getuid", lambda: tmp_path.stat().st_uid + 1)
+    found = device.openers(machine(tmp_path), usb(), me=99)
+    assert (found.found, found.commands) == ("open in sil run it (pid 7)", ())
 
 
 def test_a_program_that_probes_ports_is_switched_off_not_killed(tmp_path: Path) -> None:

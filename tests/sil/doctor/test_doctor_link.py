@@ -159,6 +159,21 @@ def test_nobody_listens_on_a_udp_port() -> None:
     assert hello.commands == (f"sil board --link udp://127.0.0.1:{port}",)
 
 
+def test_a_udp_link_that_cannot_be_opened_has_no_device_to_ask_about(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Protects: an advice that introduces a command comes with one."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise LinkError("udp: refused")
+
+    monkeypatch.setattr(link, "open_link", refuse)
+    found = examined("udp://127.0.0.1:9")["open"]
+    assert (found.status, found.found, found.advice, found.commands) == (PROBLEM, "udp: refused", "", ())
+    with far_end(nobody) as path:
+        monkeypatch.setattr(link, "open_link", refuse)
+        found = examined(path)["open"]
+    assert (found.advice, found.commands) == ("who has it open, of all users:", (f"sudo fuser -v {path}",))
+
+
 # -- not even opened --------------------------------------------------------------------------------------------------
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import os
 import resource
 import sys
 import threading
@@ -96,6 +97,56 @@ def test_processors_that_are_worth_a_note(tmp_path: Path, files: dict[str, str],
 
 
 @pytest.mark.parametrize(
+    ("files", "quota"),
+    [
+        ({"/proc/self/cgroup": "0::/user.slice/it", "/sys/fs/cgroup/user.slice/it/cpu.max": "50000 100000"}, 0.5),
+        (
+            {
+                "/proc/self/cgroup": "0::/a/b",
+                "/sys/fs/cgroup/a/cpu.max": "100000 100000",
+                "/sys/fs/cgroup/a/b/cpu.max": "max 100000",
+            },
+            1.0,
+        ),
+        ({"/sys/fs/cgroup/cpu/cpu.cfs_quota_us": "150000", "/sys/fs/cgroup/cpu/cpu.cfs_period_us": "100000"}, 1.5),
+        (
+            {
+                "/proc/self/cgroup": "9:name=systemd:/x\n4:cpu,cpuacct:/docker/it\n0::/",
+                "/sys/fs/cgroup/cpu/docker/it/cpu.cfs_quota_us": "25000",
+                "/sys/fs/cgroup/cpu/docker/it/cpu.cfs_period_us": "100000",
+            },
+            0.25,
+        ),
+        ({"/sys/fs/cgroup/cpu/cpu.cfs_quota_us": "-1", "/sys/fs/cgroup/cpu/cpu.cfs_period_us": "100000"}, None),
+        ({"/proc/self/cgroup": "nonsense\n0::/a", "/sys/fs/cgroup/a/cpu.max": "max 100000"}, None),
+    ],
+)
+def test_the_tightest_control_group_counts(tmp_path: Path, files: dict[str, str], quota: float | None) -> None:
+    """Protects: a service or a container of either version of control groups that may not use what it sees."""
+    assert checks.judge_processors(machine(tmp_path, files), [0, 1]).data["quota_cpus"] == quota
+
+
+@pytest.mark.parametrize(
+    ("runtime", "period", "says"),
+    [
+        ("-1", "1000000", "hangs stops its CPU for good"),
+        ("1000000", "1000000", "hangs stops its CPU for good"),
+        ("100000", "1000000", "are stopped when they had 0.1 of a CPU"),
+        ("950000", "1000000", ""),
+    ],
+)
+def test_an_unusual_limit_of_real_time_processes_is_a_note(
+    tmp_path: Path, runtime: str, period: str, says: str
+) -> None:
+    files = {"/proc/sys/kernel/sched_rt_runtime_us": runtime, "/proc/sys/kernel/sched_rt_period_us": period}
+    found = checks.kernel(machine(tmp_path, {**files, "/proc/version": "Linux version 6.1.0 #1 SMP PREEMPT Mon"}))
+    assert found.status == (NOTE if says else OK)
+    assert says in found.advice
+    assert found.commands == (("sudo sysctl kernel.sched_rt_runtime_us=950000",) if says else ())
+    assert (runtime in found.found) == bool(says)
+
+
+@pytest.mark.parametrize(
     ("files", "status", "says"),
     [
         ({"/proc/version": "Linux version 6.1.0-rt #1 SMP PREEMPT_RT"}, OK, "full real time"),
@@ -172,10 +223,28 @@ def test_in_a_container_its_owner_gives_the_permission(tmp_path: Path) -> None:
 
 def test_real_time_granted_says_by_what(tmp_path: Path) -> None:
     by_limit = checks.judge_real_time(machine(tmp_path / "a"), 99, lambda priority: None)
-    assert (by_limit.status, by_limit.found) == (OK, "SCHED_FIFO granted (RLIMIT_RTPRIO 99)")
+    assert (by_limit.status, by_limit.found) == (OK, "SCHED_FIFO granted, clock.priority up to 99 (RLIMIT_RTPRIO 99)")
     files = {"/proc/self/status": "Name:\tsil\nCapEff:\t0000000000800000\n"}
     by_capability = checks.judge_real_time(machine(tmp_path / "b", files), 0, lambda priority: None)
-    assert by_capability.found == "SCHED_FIFO granted (CAP_SYS_NICE)"
+    assert by_capability.found == "SCHED_FIFO granted, clock.priority up to 99 (CAP_SYS_NICE)"
+
+
+@pytest.mark.parametrize(("limit", "tried"), [(20, 20), (50, 50), (99, 50), (resource.RLIM_INFINITY, 50), (0, 1)])
+def test_a_low_limit_is_tried_as_it_is(tmp_path: Path, limit: int, tried: int) -> None:
+    """Protects: `rtprio 20` permits a priority of 20, though not one of 50."""
+    asked: list[int] = []
+    found = checks.judge_real_time(machine(tmp_path), limit, asked.append)  # type: ignore[arg-type]
+    assert asked == [tried]
+    assert found.data["highest"] == (99 if limit < 0 else max(1, limit))
+
+
+def test_the_priority_is_tried_as_a_run_asks_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Protects: an ordinary user, who may set SCHED_RESET_ON_FORK and may never clear it again."""
+    asked: list[int] = []
+    monkeypatch.setattr(checks.os, "sched_setscheduler", lambda pid, policy, parameters: asked.append(policy))
+    assert checks.try_fifo(20) is None
+    before = os.sched_getscheduler(0)
+    assert asked == [os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, before | os.SCHED_RESET_ON_FORK]
 
 
 @pytest.mark.parametrize(
@@ -226,7 +295,9 @@ def test_a_program_that_hangs_is_a_note(tmp_path: Path, monkeypatch: pytest.Monk
     [(1 << 40, True, OK), (500 << 20, True, NOTE), (50 << 20, True, PROBLEM), (1 << 40, False, NOTE)],
 )
 def test_disk(tmp_path: Path, free: int, writable: bool, status: str) -> None:
-    assert tools.judge_disk(machine(tmp_path), free, writable).status == status
+    found = tools.judge_disk(machine(tmp_path), free, writable)
+    assert found.status == status
+    assert found.commands == (tools.LARGEST if writable and status != OK else ())
 
 
 @pytest.mark.parametrize(
