@@ -1,8 +1,9 @@
 """What the documents show is true: their commands run, their files and verbs and scenarios exist, their output is real.
 
-The guide's blocks are named in the line that opens them: `sh test` runs line by line, `yaml FILE` and `python FILE`
-are files, `sh same` runs and prints what stands below each command, `sh terminal-1` and `-2` run side by side,
-`sh example` flies the example law.
+Blocks are named in the line that opens them. On the PAGES, each run in a directory of its own: `sh test` runs line by
+line, `text printed` is what the last of them printed, `yaml FILE` and `python FILE` are files, `sh not-run` gives its
+reason. In the guide also: `sh same` runs and prints what stands below each command, `sh terminal-1` and `-2` run side
+by side, `sh example` flies the example law.
 """
 
 from __future__ import annotations
@@ -24,8 +25,14 @@ from sil.scenarios import list_scenarios
 
 REPO = Path(__file__).resolve().parents[2]
 DOCUMENTS = [REPO / "README.md", REPO / "CHANGELOG.md", *sorted((REPO / "docs").glob("*.md"))]
+PAGES = ["docs/GUIDE.md", "docs/REALTIME.md", "docs/STUDIES.md", "docs/CI.md"]  # what a user follows
 FENCE = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXIT = re.compile(r"\s+# exit (\d+)$")
+NAMES = {  # of the fenced blocks a page may have
+    "sh": {"test", "same", "example", "terminal-1", "terminal-2", "not-run"},
+    "text": {"", "printed"},
+}
+PACED = ("--clock scaled", "--clock realtime")
 
 
 class Block(NamedTuple):
@@ -43,7 +50,7 @@ class Block(NamedTuple):
 
 def held_up(printed: str) -> bool:
     """A paced run passed, or says that this machine was too busy for its clock."""
-    return printed.startswith(("passed", "degraded")) or "not reproducible" in printed
+    return bool(re.search("^(passed|degraded)|not reproducible", printed, re.MULTILINE))
 
 
 def blocks(document: str) -> list[Block]:
@@ -58,7 +65,7 @@ def named(document: str, language: str, name: str) -> Block:
 def environment() -> dict[str, str]:
     """`sil` and `python` are this interpreter's; colours and widths do not depend on who runs the test."""
     here = str(Path(sys.executable).parent)
-    return {**os.environ, "PATH": f"{here}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "200", "PYTHONSAFEPATH": "1"}
+    return {**os.environ, "PATH": f"{here}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "100", "PYTHONSAFEPATH": "1"}
 
 
 def shell(command: str, folder: Path, code: int | None = 0) -> str:
@@ -79,31 +86,57 @@ def shell(command: str, folder: Path, code: int | None = 0) -> str:
     return done.stdout
 
 
-@pytest.fixture(scope="module")
-def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A directory in which every file that the guide shows lies."""
-    folder = tmp_path_factory.mktemp("guide")
-    for block in blocks("docs/GUIDE.md"):
-        if block.language in ("yaml", "python") and block.name:
+def files_of(document: str, folder: Path) -> Path:
+    """The folder, with every file in it that the page shows."""
+    for block in blocks(document):
+        if block.language in ("yaml", "python"):
             (folder / block.name).write_text(block.text)
     return folder
 
 
-# -- the guide -----------------------------------------------------------------------------------------------------
+# -- the pages -----------------------------------------------------------------------------------------------------
 
 
-def test_the_guides_commands_run_and_exit_as_it_says(guide: Path) -> None:
-    count = 0
-    for block in blocks("docs/GUIDE.md"):
+@pytest.mark.parametrize("page", PAGES)
+def test_the_pages_commands_run_exit_and_print_as_they_say(page: str, tmp_path: Path) -> None:
+    files_of(page, tmp_path)
+    printed, count = "", 0
+    for block in blocks(page):
         if (block.language, block.name) == ("sh", "test"):
             for command, code in block.commands():
-                paced = "--clock scaled" in command  # a busy machine may degrade it, which is not the guide's fault
-                printed = shell(command, guide, None if paced else code)
+                paced = any(clock in command for clock in PACED)  # a busy machine may degrade it: not the page's fault
+                printed = shell(command, tmp_path, None if paced else code)
                 assert not paced or held_up(printed), printed
                 count += 1
-        elif block.language == "python" and block.name == "reads.py":
-            shell(f"python {block.name}", guide)
-    assert count >= 15
+        elif block.language == "python" and "class " not in block.text:
+            shell(f"python {block.name}", tmp_path)
+        elif (block.language, block.name) == ("text", "printed"):
+            lines = iter(lasting(printed))  # progress, on stderr, may stand between those shown
+            assert [shown for shown in lasting(block.text) if shown not in lines] == [], printed
+    assert count >= 5
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_block_of_a_page_is_run_or_says_why_not(page: str) -> None:
+    for block in blocks(page):
+        assert block.name in NAMES.get(block.language, {block.name or "no name"}), block
+        if block.name == "not-run":
+            assert re.match(r"# not run in the test: \S+", block.text), block
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_to_headings(document: Path) -> None:
+    """`GUIDE.md#metrics` and `#metrics` name a heading as web pages of the repository spell it."""
+    for target in re.findall(r"\]\(([^)\s]*#[^)\s]+)\)", document.read_text()):
+        name, _, anchor = target.partition("#")
+        page = document.parent / name if name else document
+        headings = re.findall(r"^#+ (.*)$", re.sub(FENCE, "", page.read_text()), re.MULTILINE)
+        assert anchor in {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}, target
+
+
+@pytest.fixture(scope="module")
+def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return files_of("docs/GUIDE.md", tmp_path_factory.mktemp("guide"))
 
 
 def test_the_guides_error_lines_are_the_programs(tmp_path: Path) -> None:
@@ -182,8 +215,9 @@ def test_the_readme_prints_what_the_program_prints(readme_run: tuple[Path, str])
 
 
 def lasting(output: str) -> list[list[str]]:
-    """Words of every line, but for the time it took and the sha256, which depends on versions."""
-    return [re.split(r" s in |sha256", line)[0].split() for line in output.splitlines()]
+    """Words of every line, but for times, lateness and the sha256, which depend on the machine and on versions."""
+    lines = (re.split(r" s in |points in |sha256", line)[0].split() for line in output.splitlines())
+    return [line for line in lines if line[:1] not in (["wake-ups"], ["late"])]
 
 
 def test_the_readmes_other_commands_run(readme_run: tuple[Path, str]) -> None:
