@@ -22,6 +22,7 @@ from sil.trouble import LinkFailure
 
 ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
 LOOK_EVERY_S = 0.25
+INTERRUPTED_WAIT_ns = 1_000_000_000
 REMEMBERED_TICKS = 256
 EARLY_LIMIT = 1024  # frames; a laboratory that stood still for longer has lost the rest
 ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
@@ -113,16 +114,21 @@ class Answers:
     def finish(self, tick: int, overdue: bool) -> None:
         """The last answer that counts. `overdue`: its tick is over, so one that is not here by now is a real miss.
 
-        It is waited for all the same: a board that never gives it is dead, and the run has failed.
+        It is waited for all the same: a board that never gives it is dead, and the run has failed. Who interrupts a run
+        does not wait for a dead board.
         """
+        if not overdue:
+            give_up_ns = time.monotonic_ns() + INTERRUPTED_WAIT_ns
+            self._await(tick, lambda: time.monotonic_ns() > give_up_ns)
+            return
         if not self._lockstep:
             self.drain(tick)
-            if overdue and self._complete < tick:
+            if self._complete < tick:
                 self._window.unanswered(tick)
         self._await(tick)
 
-    def _await(self, tick: int) -> None:
-        while self._complete < tick or self._followers:
+    def _await(self, tick: int, given_up: Callable[[], bool] = lambda: False) -> None:
+        while (self._complete < tick or self._followers) and not given_up():
             packet = self._port.receive(LOOK_EVERY_S)
             if packet is not None:
                 self._take(packet)

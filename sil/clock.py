@@ -8,7 +8,6 @@ A tick that wakes more than a period late re-bases the epoch: ticks are neither 
 
 from __future__ import annotations
 
-import ctypes
 import time
 from collections.abc import Callable
 from typing import Protocol
@@ -16,7 +15,6 @@ from typing import Protocol
 # Waiting for frames ends a little before the deadline, and the last stretch is slept: poll() has a grain of 1 ms, and
 # the link uses select(), which has none, for waits below COARSE_NS only.
 COARSE_NS, COARSE_MARGIN_NS, MARGIN_NS = 20_000_000, 2_000_000, 200_000
-PR_SET_TIMERSLACK = 29
 
 
 class Clock(Protocol):
@@ -61,7 +59,6 @@ class Scaled:
         self._now = now
         self._spin_ns = spin_ns
         self._epoch_ns = 0
-        _set_timer_slack()
 
     def start(self, first_tick_ns: int) -> None:
         self.rebase(first_tick_ns)
@@ -69,7 +66,7 @@ class Scaled:
     def wait(self, t_ns: int, listen: Callable[[float], None]) -> int:
         deadline, spin_ns = self._epoch_ns + int(t_ns / self.scale), self._spin_ns
         while (left := deadline - self._now()) > 0:
-            margin = COARSE_MARGIN_NS if left >= COARSE_NS else MARGIN_NS
+            margin = max(COARSE_MARGIN_NS if left >= COARSE_NS else MARGIN_NS, spin_ns)
             if left > margin:
                 listen((left - margin) * 1e-9)
             elif left > spin_ns:
@@ -94,11 +91,3 @@ def new_clock(name: str, period_ns: int = 0, spin_us: int = 0) -> Clock:
 def clock_rate_q16(clock: Clock) -> int:
     """HELLO's clock rate: simulated seconds per wall second in Q16; 0 switches the board's own timer off."""
     return min(round(clock.scale * 65536), 0xFFFFFFFF) if clock.paced else 0
-
-
-def _set_timer_slack() -> None:
-    """1 ns instead of Linux's 50 us of permitted lateness; unprivileged, and no matter where it is refused."""
-    try:
-        ctypes.CDLL(None, use_errno=True).prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
-    except (OSError, AttributeError):
-        return

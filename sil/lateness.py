@@ -10,11 +10,12 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, ParamSpec
 
 import numpy as np
 import numpy.typing as npt
 
+P = ParamSpec("P")
 HISTOGRAM_EDGES_us = tuple(digit * 10**power for power in range(7) for digit in (1, 2, 5))
 
 
@@ -27,6 +28,7 @@ class Cause(IntEnum):
     GARBAGE_COLLECTION = 3  # of Python
     LOG_WRITE = 4  # the journal's write to the kernel
     LATE_ANSWER = 5  # a frame that came just before the deadline was being taken
+    LINK_WRITE = 6  # the link took no more: its other end does not read
 
 
 class Wake(NamedTuple):
@@ -43,7 +45,10 @@ QUIET = Wake(0, Cause.NONE, 0, 0, 0)
 
 
 class Account:
-    """Follows one loop: `listening(...)` around each wait for frames, `writing(...)` around the log, `woke(...)`."""
+    """Follows one loop: `listening(...)` around each wait for frames, `call(...)` of what may block, `woke(...)`.
+
+    Time in which the tick neither computed nor was in a call that is known to block was taken by the machine.
+    """
 
     def __init__(
         self, now: Callable[[], int] = time.monotonic_ns, cpu_now: Callable[[], int] = time.thread_time_ns
@@ -52,7 +57,8 @@ class Account:
         self._woke_ns = self._woke_cpu_ns = 0  # when the tick under way began
         self._slept_ns = self._work_ns = 0  # when it was over, and the CPU time it took
         self._listened_ns = self._listened_cpu_ns = 0  # end of the last wait for frames, and its CPU time
-        self._gc_began_ns = self._gc_ns = self._log_ns = 0
+        self._listened_gc_ns = self._gc_began_ns = self._gc_ns = 0
+        self._in_call_ns = dict.fromkeys((Cause.LOG_WRITE, Cause.LINK_WRITE, Cause.OWN_WORK), 0)
         self._before = QUIET
 
     def __enter__(self) -> Account:
@@ -68,11 +74,15 @@ class Account:
         else:
             self._gc_ns += self._now() - self._gc_began_ns
 
-    def writing(self, write: Callable[[int], None], tick: int) -> None:
-        """`write(tick)`, whose time is the log's."""
+    def call(self, cause: Cause, function: Callable[P, object], *arguments: P.args, **named: P.kwargs) -> None:
+        """function(*arguments); the time in it, also where it waits, is `cause`'s: LOG_WRITE, LINK_WRITE, OWN_WORK."""
         began = self._now()
-        write(tick)
-        self._log_ns += self._now() - began
+        function(*arguments, **named)
+        self._in_call_ns[cause] += self._now() - began
+
+    def rebased(self) -> None:
+        """The epoch moved: the lateness of this tick is forgiven, and explains none that comes after."""
+        self._before = QUIET
 
     def sleeps(self) -> None:
         """The tick's work is over; what follows is waiting."""
@@ -84,9 +94,9 @@ class Account:
         """The same wait for frames, with an eye on when it ended and what it computed."""
 
         def watched(timeout_s: float) -> None:
-            began = self._cpu_now()
+            began, gc_ns = self._cpu_now(), self._gc_ns
             listen(timeout_s)
-            self._listened_cpu_ns = self._cpu_now() - began
+            self._listened_cpu_ns, self._listened_gc_ns = self._cpu_now() - began, self._gc_ns - gc_ns
             self._listened_ns = self._now()
 
         return watched
@@ -94,29 +104,40 @@ class Account:
     def woke(self, late_ns: int) -> Wake:
         """The next tick begins `late_ns` after its deadline."""
         now = self._now()
-        wake = Wake(late_ns, self._cause(late_ns, now - late_ns), self._work_ns, self._gc_ns, self._log_ns)
+        log_ns = self._in_call_ns[Cause.LOG_WRITE]
+        wake = Wake(late_ns, self._cause(late_ns, now - late_ns), self._work_ns, self._gc_ns, log_ns)
         self._before, self._woke_ns, self._woke_cpu_ns = wake, now, self._cpu_now()
-        self._gc_ns = self._log_ns = 0
+        self._gc_ns = 0
+        for each in self._in_call_ns:
+            self._in_call_ns[each] = 0
         return wake
 
     def _cause(self, late_ns: int, deadline_ns: int) -> Cause:
         if late_ns <= 0:
             return Cause.NONE
         if self._slept_ns <= deadline_ns:
-            overran = self._listened_ns > deadline_ns
-            taking = overran and 2 * self._listened_cpu_ns > self._listened_ns - deadline_ns
-            return Cause.LATE_ANSWER if taking else Cause.MACHINE
+            return self._cause_of_waiting(self._listened_ns - deadline_ns)
         over_ns = self._slept_ns - deadline_ns
         if self._before.late_ns >= over_ns:
             return self._before.cause  # the tick before began late, and did nothing else wrong
-        away_ns = self._slept_ns - self._woke_ns - self._work_ns - self._log_ns
+        in_call = self._in_call_ns
+        away_ns = self._slept_ns - self._woke_ns - self._work_ns - sum(in_call.values())
         spent = {
-            Cause.OWN_WORK: self._work_ns - self._gc_ns,
+            Cause.OWN_WORK: max(self._work_ns - self._gc_ns, in_call[Cause.OWN_WORK]),
             Cause.GARBAGE_COLLECTION: self._gc_ns,
-            Cause.LOG_WRITE: self._log_ns,
+            Cause.LOG_WRITE: in_call[Cause.LOG_WRITE],
+            Cause.LINK_WRITE: in_call[Cause.LINK_WRITE],
             Cause.MACHINE: away_ns,
         }
         return max(spent, key=spent.__getitem__)
+
+    def _cause_of_waiting(self, overran_ns: int) -> Cause:
+        """The tick was over in time; the last wait for frames ended `overran_ns` after the deadline, or before it."""
+        if overran_ns <= 0:
+            return Cause.MACHINE
+        if 2 * self._listened_gc_ns > overran_ns:
+            return Cause.GARBAGE_COLLECTION
+        return Cause.LATE_ANSWER if 2 * self._listened_cpu_ns > overran_ns else Cause.MACHINE
 
 
 def of_run(

@@ -19,7 +19,7 @@ from protocol import events
 from protocol.frames import Reading, Sample
 from sil.clock import Clock
 from sil.commands import Acting, Decides
-from sil.lateness import QUIET, Account, Wake
+from sil.lateness import QUIET, Account, Cause, Wake
 from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
 
 LARGEST = 2**31 - 1
@@ -83,7 +83,7 @@ class Loop:
         if not is_finite(motion):
             raise PlantBroke(k)
         applied = self._limited(acting, motion)
-        self.board.send(self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
+        self.account.call(Cause.LINK_WRITE, self.board.send, self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
         self._commit(k - 1)  # tick k - 1 is whole only now, with its answer; the board works meanwhile
         if not delay:
             self.board.drain(k)
@@ -112,14 +112,15 @@ class Loop:
             except PlantBroke:
                 self.recorder.event(k, events.PLANT_NAN, k, 0)
                 return self._ended(k, "diverged")
-            progress(k, motion)
+            self.account.call(Cause.OWN_WORK, progress, k, motion)
             if self._beyond(k, motion):
                 return self._last(k, "diverged")
         return self._last(self.timing.ticks - 1, "finished")
 
     def _last(self, k: int, reason: str) -> tuple[int, str]:
         """Tick k was the last one: its command would act from the next on, and is waited for until then."""
-        self._await_tick(k + 1)
+        if self.clock.paced:
+            self.clock.wait((k + 1) * self.timing.period_ns, self.board.listen)
         self.board.finish(k, overdue=True)
         return self._ended(k + 1, reason)
 
@@ -155,6 +156,7 @@ class Loop:
             self.slipped_ns += late_ns
             self.recorder.event(k, events.EPOCH_REBASED, k, min(late_ns // 1000, 2**31 - 1))
             self.clock.rebase(t_ns)
+            self.account.rebased()
 
     def _limited(self, acting: Acting, motion: Motion) -> Vector:
         command_Nm = np.array(acting.torque_Nm)
@@ -185,10 +187,7 @@ class Loop:
 
     def _commit(self, k: int) -> None:
         """Tick k is whole: one write."""
-        if self.clock.paced:
-            self.account.writing(self.recorder.commit, max(k, 0))
-        else:
-            self.recorder.commit(max(k, 0))
+        self.account.call(Cause.LOG_WRITE, self.recorder.commit, max(k, 0))
 
     def _notices(self, k: int) -> None:
         for code, a, b in self.commands.notices:

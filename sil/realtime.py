@@ -11,20 +11,23 @@ import gc
 import os
 import resource
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import NamedTuple
 
 from sil.scenario_sections import Clock
 from sil.trouble import UsageError
 
 MCL_CURRENT, MCL_FUTURE = 1, 2
+PR_SET_TIMERSLACK, PR_GET_TIMERSLACK = 29, 30
 
 
 class Granted(NamedTuple):
     """What the machine gave, and a line for each thing that it refused."""
 
     priority: int | None
+    board_priority: int | None
     memory_locked: bool
     lab_cpu: int | None
     board_cpu: int | None
@@ -35,26 +38,23 @@ class Granted(NamedTuple):
 def granted(clock: Clock, paced: bool, board_pid: int | None) -> Iterator[Granted]:
     """Ask for all that `clock` names, for this process and, where it is ours, the board's; give it back at the end.
 
-    Called when everything is set up: compiling and loading need no priority. The board locks its own memory
-    (`python -m firmware_sim --lock-memory`). A paced run's garbage collector looks only at what the run itself makes.
-    Raises UsageError as refuse_impossible() does.
+    Called when everything is set up: compiling and loading need no priority. The board runs one below the laboratory,
+    so that a law that never returns cannot keep the laboratory from noticing; it locks its own memory (`python -m
+    firmware_sim --lock-memory`). A paced run's timers have no slack (1 ns for Linux's 50 us), and its garbage collector
+    looks only at what the run itself makes. Raises UsageError as refuse_impossible() does.
     """
     refuse_impossible(clock)
     refused: list[str] = []
-    undo: list[Callable[[], None]] = []
-    try:
+    with ExitStack() as undo:
+        if paced:
+            _timer_slack(undo)
         lab_cpu = _cpu(0, clock.lab_cpu, "clock.lab_cpu", refused, undo)
         board_cpu = _cpu(board_pid, clock.board_cpu, "clock.board_cpu", refused, undo)
         locked = _lock_memory(refused, undo) if clock.locks_memory else False
-        priority = _priority(clock.priority, board_pid, refused, undo)
+        priority, below = _priorities(clock.priority, board_pid, refused, undo)
         if paced:
-            gc.collect()
-            gc.freeze()
-            undo.append(gc.unfreeze)
-        yield Granted(priority, locked, lab_cpu, board_cpu, tuple(refused))
-    finally:
-        for step in reversed(undo):
-            step()
+            _freeze(undo)
+        yield Granted(priority, below, locked, lab_cpu, board_cpu, tuple(refused))
 
 
 def refuse_impossible(clock: Clock) -> None:
@@ -66,40 +66,71 @@ def refuse_impossible(clock: Clock) -> None:
             raise UsageError(f"{key}: expected a CPU this process may use, got {cpu}; known: {known}")
 
 
-def _cpu(pid: int | None, cpu: int | None, key: str, refused: list[str], undo: list[Callable[[], None]]) -> int | None:
+def _timer_slack(undo: ExitStack) -> None:
+    libc = ctypes.CDLL(None)
+    before = libc.prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0)
+    if before > 1 and libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0:
+        undo.callback(libc.prctl, PR_SET_TIMERSLACK, before, 0, 0, 0)
+
+
+def _freeze(undo: ExitStack) -> None:
+    gc.collect()
+    if not gc.get_freeze_count():  # else somebody has frozen before us, and it is theirs to undo
+        undo.callback(gc.unfreeze)
+    gc.freeze()
+
+
+def _cpu(pid: int | None, cpu: int | None, key: str, refused: list[str], undo: ExitStack) -> int | None:
     if cpu is None:
         return None
     if pid is None:
         refused.append(f"{key}: the board is no process of this run's; use taskset where it is started")
         return None
-    before = os.sched_getaffinity(pid)
-    os.sched_setaffinity(pid, {cpu})
+    try:
+        before = os.sched_getaffinity(pid)
+        os.sched_setaffinity(pid, {cpu})
+    except OSError as error:
+        refused.append(f"{key}: refused ({error.strerror})")
+        return None
     if pid == 0:
-        undo.append(lambda: os.sched_setaffinity(0, before))
+        undo.callback(os.sched_setaffinity, 0, before)
     return cpu
 
 
-def _priority(
-    priority: int | None, board_pid: int | None, refused: list[str], undo: list[Callable[[], None]]
-) -> int | None:
-    """SCHED_FIFO for this thread and for the board. What either starts later runs at ordinary priority again."""
-    if priority is None:
-        return None
-    before, parameters = os.sched_getscheduler(0), os.sched_getparam(0)
-    policy, wanted = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority)
+def _priorities(
+    priority: int | None, board_pid: int | None, refused: list[str], undo: ExitStack
+) -> tuple[int | None, int | None]:
+    """SCHED_FIFO for this thread, and one less for the board. What either starts later runs at ordinary priority."""
+    if priority is None or not _fifo(0, priority, refused, undo):
+        return None, None
+    below = priority - 1 or None  # 0 is no real-time priority: the board's stays ordinary
+    if board_pid is None or below is None or not _fifo(board_pid, below, refused, undo):
+        return priority, None
+    return priority, below
+
+
+def _fifo(pid: int, priority: int, refused: list[str], undo: ExitStack) -> bool:
     try:
-        os.sched_setscheduler(0, policy, wanted)
-        undo.append(lambda: os.sched_setscheduler(0, before, parameters))
-        if board_pid is not None:
-            os.sched_setscheduler(board_pid, policy, wanted)
+        before, parameters = os.sched_getscheduler(pid), os.sched_getparam(pid)
+        os.sched_setscheduler(pid, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(priority))
     except OSError as error:
         limit = resource.getrlimit(resource.RLIMIT_RTPRIO)[0]
         refused.append(
             f"clock.priority: SCHED_FIFO {priority} refused ({error.strerror}, RLIMIT_RTPRIO {limit}); "
             f"`sil doctor` says how to permit it"
         )
-        return None
-    return priority
+        return False
+    if pid == 0:
+        undo.callback(_ordinary, before, parameters)
+    return True
+
+
+def _ordinary(policy: int, parameters: os.sched_param) -> None:
+    """The policy from before. Who may raise a priority need not be allowed to clear SCHED_RESET_ON_FORK: it stays."""
+    try:
+        os.sched_setscheduler(0, policy, parameters)
+    except PermissionError:
+        os.sched_setscheduler(0, policy | os.SCHED_RESET_ON_FORK, parameters)
 
 
 def may_lock_memory() -> bool:
@@ -112,12 +143,19 @@ def suspended_ns() -> int:
     return time.clock_gettime_ns(time.CLOCK_BOOTTIME) - time.clock_gettime_ns(time.CLOCK_MONOTONIC)
 
 
-def _lock_memory(refused: list[str], undo: list[Callable[[], None]]) -> bool:
+def _lock_memory(refused: list[str], undo: ExitStack) -> bool:
     """mlockall, but only where no limit can turn a later allocation into a failure."""
-    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
-    libc = ctypes.CDLL(None, use_errno=True)
-    if may_lock_memory() and libc.mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
-        undo.append(libc.munlockall)
+    locked_before = _locked_kB()
+    if may_lock_memory() and ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+        if not locked_before:
+            undo.callback(ctypes.CDLL(None).munlockall)
         return True
+    limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     refused.append(f"clock.lock_memory: refused (RLIMIT_MEMLOCK {limit} bytes); `sil doctor` says how to permit it")
     return False
+
+
+def _locked_kB() -> int:
+    """Memory this process has locked already."""
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
+    return next((int(line.split()[1]) for line in lines if line.startswith("VmLck:")), 0)

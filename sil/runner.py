@@ -115,8 +115,8 @@ def _fly(
     watch.stage("start")
     try:
         rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note, wired)
-    except BaseException:
-        _discard(folder, made, recorder)
+    except BaseException as error:
+        _discard(folder, made, recorder, keep_last_words=not isinstance(error, KeyboardInterrupt))
         raise
     stop.hold()
     watch.plugged(scenario, rig)
@@ -162,12 +162,12 @@ def _close(recorder: JournalRecorder, outcome: Outcome) -> None:
         outcome.failure = outcome.failure or str(error)
 
 
-def _discard(folder: Path, made: bool, recorder: JournalRecorder) -> None:
-    """Nothing was run: leave nothing half-made behind (a board's last words stay, if there are any)."""
+def _discard(folder: Path, made: bool, recorder: JournalRecorder, keep_last_words: bool) -> None:
+    """Nothing was run: leave nothing half-made behind (a board's last words stay, if there are any to keep)."""
     recorder.close()
     (folder / "run.journal").unlink(missing_ok=True)
     log = folder / "board.log"
-    if log.exists() and not log.stat().st_size:
+    if log.exists() and not (keep_last_words and log.stat().st_size):
         log.unlink()
     if made and not any(folder.iterdir()):
         folder.rmdir()

@@ -71,7 +71,10 @@ class Counterpart(Protocol):
         """Wait up to `timeout_s` for one frame and take it."""
 
     def finish(self, tick: int, overdue: bool) -> None:
-        """The run is over: the answer to `tick` is the last one that counts; `overdue`: it should be here by now."""
+        """The run is over: the answer to `tick` is the last one that counts; `overdue`: it should be here by now.
+
+        Not overdue: the run was interrupted, and the answer is waited for a moment only.
+        """
 
 
 class Recorder(Protocol):

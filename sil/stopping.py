@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM and a closed terminal: as a wish that a loop looks at each tick, or all alike as KeyboardInterrupt."""
+"""Ctrl-C, SIGTERM, a closed terminal: as a wish that a loop looks at each tick, or all alike as KeyboardInterrupt."""
 
 from __future__ import annotations
 

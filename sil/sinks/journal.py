@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 MAGIC = b"SILJRNL\n"
-VERSION = 2  # 1 had no causes of lateness
+VERSION = 2  # 1, still read, had no causes of lateness
 PAYLOAD_LIMIT = 16 * 2**20  # bytes; more is taken for a damaged length
 READ_BLOCK = 2**20
 NO_ANSWER = -1  # TIMING.answer_ns where no answer came
@@ -32,7 +32,7 @@ _HEAD = struct.Struct("<IIB")
 _CRC = struct.Struct("<I")
 _TRUTH = struct.Struct("<16d3iB")
 _LAB_EVENT = struct.Struct("<Hii")
-_TIMING = struct.Struct("<qqqqqI")
+_TIMING, _TIMING_1 = struct.Struct("<qqqqqI"), struct.Struct("<qqI")
 _HOUSEKEEPING = struct.Struct("<Bq")
 _PACKET = struct.Struct("<BBH")
 
@@ -162,6 +162,9 @@ def timing_payload(
 
 def read_timing(payload: bytes) -> Timing:
     """The inverse of timing_payload."""
+    if len(payload) == _TIMING_1.size:
+        lateness_ns, answer_ns, _ = _TIMING_1.unpack(payload)
+        return Timing(lateness_ns, answer_ns, 0, 0, 0, 0)
     return Timing(*_TIMING.unpack(payload))
 
 
@@ -320,8 +323,8 @@ class JournalReader:
         magic, version = _FILE_HEADER.unpack(header)
         if magic != MAGIC:
             raise JournalError(f"{self.path}: expected a journal (it starts with {MAGIC!r}), got {magic!r}")
-        if version != VERSION:
-            raise JournalError(f"{self.path}: expected journal version {VERSION}, got {version}")
+        if version not in (1, VERSION):
+            raise JournalError(f"{self.path}: expected journal version 1 or {VERSION}, got {version}")
 
 
 def read_journal(path: str | os.PathLike[str]) -> JournalReader:

@@ -18,7 +18,7 @@ from sil.lateness import Cause
 from sil.sinks import layouts
 
 FAST_PD = ("appc-rs232", "--set", "law={name: pd}", "--set", "period_s=0.1", "--set", "require=[]")
-STOPPED_s, DURATION_s = 5.0, 4.0
+STOPPED_s, DURATION_s, PERIOD_s = 5.0, 4.0, 0.1
 
 
 def rows(folder: Path, topic: str, layout: layouts.Layout):
@@ -45,15 +45,16 @@ def test_stopped_for_five_seconds(cli, who):
     run = open_run(cli.folder / "run")
     timing = run.summary["timing"]
     assert run.summary["verdict"] == "degraded" and timing["degraded"]
-    assert STOPPED_s - 0.2 < timing["slipped_s"] < STOPPED_s + 5  # more than the stop itself only on a busy machine
+    assert timing["slipped_s"] > STOPPED_s - 2 * PERIOD_s
     assert timing["rebased_ticks"] >= 1 and timing["late_ticks"] >= timing["rebased_ticks"]
     # no burst: what was slept away was not made up for, every tick kept its period
-    assert timing["wall_s"] > DURATION_s + timing["slipped_s"] - 0.15
+    assert timing["wall_s"] > DURATION_s + timing["slipped_s"] - 2 * PERIOD_s
     # complete: every tick in order, to the end
-    assert run.tick.tolist() == list(range(round(DURATION_s / 0.1))) and run.end["reason"] == "finished"
+    assert run.tick.tolist() == list(range(round(DURATION_s / PERIOD_s))) and run.end["reason"] == "finished"
     moved = rows(cli.folder / "run", "/event", layouts.EVENT)
     moved = moved[moved["code"] == events.EPOCH_REBASED]
-    assert moved["b"].max() * 1e-6 == pytest.approx(STOPPED_s, abs=0.6)
+    assert moved["b"].sum() * 1e-6 == pytest.approx(timing["slipped_s"], abs=1e-5 * len(moved))
+    assert moved["b"].max() * 1e-6 > STOPPED_s - 2 * PERIOD_s
     late = rows(cli.folder / "run", "/timing", layouts.TIMING)
     worst = late[late["lateness_ns"].argmax()]
     assert worst["tick"] == moved["a"][moved["b"].argmax()]
@@ -65,7 +66,7 @@ def test_limits_of_the_scenario_decide_degraded(cli):
     paced = (*FAST_PD, "--set", "duration_s=1", "--clock", "realtime", "--set", "timing.max_lateness_ms=0.000001")
     summary = cli.json("run", *paced, "--out", "strict", code=3)
     assert summary["verdict"] == "degraded"
-    assert summary["timing"]["late_ticks"] > 5 and summary["timing"]["late_beyond_ms"] == 1e-6
+    assert 5 < summary["timing"]["late_ticks"] <= summary["ticks"] and summary["timing"]["late_beyond_ms"] == 1e-6
     assert sum(summary["timing"]["causes"]["late_ticks"].values()) == summary["timing"]["late_ticks"]
     summary = cli.json("run", *paced, "--set", "timing.max_degraded_fraction=1", "--out", "lenient")
     assert summary["verdict"] == "passed" and summary["timing"]["late_ticks"] > 5

@@ -79,7 +79,7 @@ def test_standing_still_during_the_work_blames_the_machine():
 def test_a_slow_write_of_the_log():
     bench = Bench()
     bench.times.work(MS)
-    bench.account.writing(lambda tick: bench.times.away(15 * MS), 0)
+    bench.account.call(Cause.LOG_WRITE, bench.times.away, 15 * MS)
     bench.account.sleeps()
     wake = bench.wake()
     assert (wake.cause, wake.log_ns) == (Cause.LOG_WRITE, 15 * MS)
@@ -125,6 +125,47 @@ def test_lateness_that_is_carried_over_keeps_its_cause():
     bench.account.sleeps()
     wake = bench.wake()
     assert (wake.late_ns, wake.cause) == (MS // 2, Cause.MACHINE)
+
+
+@pytest.mark.parametrize("cause", [Cause.LINK_WRITE, Cause.OWN_WORK])
+def test_a_call_that_waits_is_not_the_machines_fault(cause: Cause):
+    """A board that does not read its pty, a view that sleeps: no CPU time passes, and still nobody stopped us."""
+    bench = Bench()
+    bench.times.work(MS)
+    bench.account.call(cause, bench.times.away, 13 * MS)
+    bench.account.sleeps()
+    assert bench.wake().cause is cause
+
+
+def test_garbage_collection_while_a_frame_is_taken():
+    bench = Bench()
+    with bench.account:
+        bench.account.sleeps()
+        bench.times.away(8 * MS)
+
+        def collect(timeout_s: float) -> None:
+            bench.account._collecting("start", {})
+            bench.times.work(5 * MS)
+            bench.account._collecting("stop", {})
+
+        bench.account.listening(collect)(0.001)
+        assert bench.wake().cause is Cause.GARBAGE_COLLECTION
+
+
+def test_a_moved_epoch_forgives_what_came_before():
+    """After one long stop, a tick that computes too long is own work again, however late the stopped one was."""
+    bench = Bench()
+    bench.times.away(5000 * MS)
+    bench.account.sleeps()
+    assert bench.wake().cause is Cause.MACHINE
+    bench.account.rebased()
+    bench.tick = bench.times.wall_ns // PERIOD_ns + 2
+    bench.times.wall_ns = (bench.tick - 1) * PERIOD_ns
+    bench.account.woke(0)
+    for _ in range(3):
+        bench.times.work(25 * MS)
+        bench.account.sleeps()
+        assert bench.wake().cause is Cause.OWN_WORK
 
 
 @given(st.lists(st.integers(0, 10**11), max_size=300))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -13,7 +16,9 @@ from sil.trouble import UsageError
 
 
 def settings() -> tuple[object, ...]:
-    return os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, os.sched_getaffinity(0), gc.get_freeze_count()
+    slack_ns = ctypes.CDLL(None).prctl(realtime.PR_GET_TIMERSLACK, 0, 0, 0, 0)
+    scheduling = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority, os.sched_getaffinity(0), slack_ns
+    return *scheduling, gc.get_freeze_count(), realtime._locked_kB()
 
 
 def test_all_is_as_before_afterwards():
@@ -41,8 +46,6 @@ def test_also_after_an_exception():
 
 def test_the_board_process_is_placed_too():
     """A child stands in for the board."""
-    import subprocess
-
     cpu = max(os.sched_getaffinity(0))
     with subprocess.Popen(["sleep", "30"]) as child:
         try:
@@ -75,4 +78,62 @@ def test_a_refused_priority_is_one_line(monkeypatch):
 def test_lockstep_asks_for_nothing_by_default():
     before = settings()
     with realtime.granted(Clock(), False, None) as got:
-        assert settings() == before and got == (None, False, None, None, ())
+        assert settings() == before and got == (None, None, False, None, None, ())
+
+
+def test_what_a_caller_froze_and_locked_before_stays_so():
+    gc.freeze()
+    try:
+        with realtime.granted(Clock(mode="realtime"), True, None):
+            pass
+        assert gc.get_freeze_count() > 0
+    finally:
+        gc.unfreeze()
+
+
+def test_the_board_runs_one_below_the_laboratory():
+    """A law that never returns must not keep the laboratory, on the same CPU, from noticing."""
+    with subprocess.Popen(["sleep", "30"]) as child:
+        try:
+            with realtime.granted(Clock(mode="realtime", priority=7), True, child.pid) as got:
+                if got.priority is None:
+                    pytest.skip("SCHED_FIFO is not permitted here")
+                assert (got.priority, got.board_priority) == (7, 6)
+                assert os.sched_getparam(child.pid).sched_priority == 6
+        finally:
+            child.kill()
+
+
+def test_a_board_that_has_gone_is_said_and_the_laboratory_keeps_what_it_got():
+    with subprocess.Popen(["true"]) as child:
+        child.wait()
+    cpu = min(os.sched_getaffinity(0))
+    with realtime.granted(Clock(mode="realtime", board_cpu=cpu), True, child.pid) as got:
+        assert got.board_cpu is None and got.refused == ("clock.board_cpu: refused (No such process)",)
+
+
+DROPPED = """
+import ctypes, os
+from sil import realtime
+from sil.scenario_sections import Clock
+class Header(ctypes.Structure):
+    _fields_ = [("version", ctypes.c_uint32), ("pid", ctypes.c_int)]
+with realtime.granted(Clock(mode="realtime", priority=5, lab_cpu=min(os.sched_getaffinity(0))), True, None) as got:
+    assert got.priority == 5
+    libc = ctypes.CDLL(None, use_errno=True)
+    assert libc.capset(ctypes.byref(Header(0x20080522, 0)), (ctypes.c_uint32 * 6)()) == 0
+assert os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK == os.SCHED_OTHER
+print(len(os.sched_getaffinity(0)))
+"""
+
+
+def test_who_may_not_clear_a_flag_gets_ordinary_priority_back_all_the_same():
+    """An ordinary user with an rtprio limit: SCHED_RESET_ON_FORK stays, and the rest is undone."""
+    if not realtime.may_lock_memory() or os.geteuid() != 0:
+        pytest.skip("needs a root that can drop its capabilities")
+    with realtime.granted(Clock(mode="realtime", priority=5), True, None) as got:
+        if got.priority is None:
+            pytest.skip("SCHED_FIFO is not permitted here")
+    done = subprocess.run([sys.executable, "-c", DROPPED], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) == len(os.sched_getaffinity(0))

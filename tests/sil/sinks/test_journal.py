@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import struct
 import zlib
 from pathlib import Path
 
@@ -136,12 +137,20 @@ def test_an_existing_journal_is_never_overwritten(tmp_path: Path) -> None:
         Journal(tmp_path / "j")
 
 
+def test_a_journal_of_version_1_is_still_read(tmp_path: Path) -> None:
+    """A run that was killed before an upgrade can be recovered after it."""
+    content = written(tmp_path / "j")
+    (tmp_path / "old").write_bytes(content[:8] + b"\1\0\0\0" + content[12:])
+    assert len(read(tmp_path / "old")[0]) == len(read(tmp_path / "j")[0])
+    assert jn.read_timing(struct.pack("<qqI", 987, 654, 7)) == (987, 654, 0, 0, 0, 0)
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
         (b"", "expected a journal, got 0 bytes"),
         (b"\x89MCAP0\r\nxxxx", "it starts with"),
-        (b"SILJRNL\n\x09\0\0\0", "expected journal version 2, got 9"),
+        (b"SILJRNL\n\x09\0\0\0", "expected journal version 1 or 2, got 9"),
     ],
 )
 def test_foreign_files_are_refused_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
