@@ -44,7 +44,7 @@ def started(cli, *arguments, ticks=20):
     return process, board
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_both_processes_and_leaves_a_complete_log(cli, number):
     process, board = started(cli)
     process.send_signal(number)
@@ -57,6 +57,17 @@ def test_a_signal_ends_both_processes_and_leaves_a_complete_log(cli, number):
     assert len(run) == summary["ticks"] > 0
     assert run.end["reason"] == "interrupted"
     assert json.loads((cli.folder / "run" / "summary.json").read_text()) == summary
+
+
+def test_who_interrupts_a_run_does_not_wait_for_a_board_that_hangs(cli):
+    """Interrupted comes first among the exit codes, and the log holds what there was."""
+    process, board = started(cli)
+    os.kill(board, signal.SIGSTOP)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    assert json.loads(out)["verdict"] == "interrupted" and not alive(board)
+    assert len(open_run(cli.folder / "run")) == json.loads(out)["ticks"] > 0
 
 
 def test_a_signal_before_anything_ran_leaves_nothing_behind(cli):
