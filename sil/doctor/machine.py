@@ -88,7 +88,8 @@ def kernel(around: Surroundings) -> Finding:
     runtime = around.number("/proc/sys/kernel/sched_rt_runtime_us")
     data = {"release": release, "preemption": model, "sched_rt_runtime_us": runtime}
     found = f"{release}, preemption: {model}"
-    advices, commands = [], ()
+    advices: list[str] = []
+    commands: tuple[str, ...] = ()
     if model.startswith(("none", "voluntary")):
         advices.append(
             "a long system call delays wake-ups by milliseconds; for real time boot with preempt=full, or PREEMPT_RT"

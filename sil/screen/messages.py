@@ -7,6 +7,10 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+BIGGEST = 1 << 20  # bytes of a datagram
+BEGIN_FRAME, END_FRAME = "\x1b[?2026h", "\x1b[?2026l"  # synchronized output; terminals that do not know it ignore it
+SHOW_CURSOR = "\x1b[?25h"
+
 Triple = tuple[float, float, float]
 Sample = tuple[float, Triple, Triple | None]  # simulated s, attitude and reference in deg
 EventRow = tuple[float, int, int, int, int]  # simulated s, code, a, b, origin (0 laboratory, 1 board)

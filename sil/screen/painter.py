@@ -1,4 +1,4 @@
-"""The process that draws: `python -m sil.screen.painter`, datagrams on standard input, the view on standard error.
+"""The process that draws: `python -m sil.screen.painter CPU...`, datagrams on stdin, the view on stderr.
 
 A process of its own, because drawing takes milliseconds and a terminal may stop taking characters (Ctrl-S, slow line):
 neither may reach the laboratory's loop. It ends when the laboratory says so or is gone, however that came about, and
@@ -20,36 +20,40 @@ from rich.live import Live
 from rich.text import Text
 
 from sil.screen import messages, view
-from sil.screen.messages import End, Line, Message, Plan, State
+from sil.screen.messages import BEGIN_FRAME, BIGGEST, END_FRAME, End, Line, Message, Plan, State
 from sil.screen.seen import Seen
 
 DRAW_EVERY_S = 0.1
 COST_SHARE = 0.2  # of the time, at most, goes into drawing
 LOOK_EVERY_S = 0.5  # at the size of the window, when nothing comes
 LINES_AT_ONCE = 5000
-BIGGEST = 1 << 20  # bytes of a datagram
 READY = b"ready"
-BEGIN_FRAME, END_FRAME = "\x1b[?2026h", "\x1b[?2026l"  # synchronized output; terminals that do not know it ignore it
+NO_SIZE = os.terminal_size((0, 0))
 
 
 def main() -> None:
     """Draw until the run is over."""
-    stay_out_of_the_way()
+    stay_out_of_the_way({int(cpu) for cpu in sys.argv[1:]})
     orders = socket.socket(fileno=0)
+    painter = Painter(orders, Console(file=_WholeFrames(sys.stderr), force_terminal=True))  # type: ignore[arg-type]
+    signal.signal(signal.SIGTSTP, painter.stop_asked)
     try:
         orders.send(READY)
-        Painter(orders, Console(file=_WholeFrames(sys.stderr), force_terminal=True)).work()  # type: ignore[arg-type]
+        painter.work()
     except OSError:
         return  # the terminal is gone, and nobody is left to tell
 
 
-def stay_out_of_the_way() -> None:
-    """Ordinary priority, any CPU, nice: whatever the laboratory was granted is not for drawing. Ctrl-C is its too."""
+def stay_out_of_the_way(cpus: set[int]) -> None:
+    """Ordinary priority, the CPUs that the laboratory was started on, nice: what a run was granted is not for drawing.
+
+    Ctrl-C is the laboratory's too.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     try:
         os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
-        os.sched_setaffinity(0, range(os.cpu_count() or 1))
+        os.sched_setaffinity(0, cpus)
         os.nice(10)
     except OSError:
         return
@@ -61,10 +65,11 @@ class Painter:
     def __init__(self, orders: socket.socket, console: Console) -> None:
         self._orders, self._console = orders, console
         self._seen: Seen | None = None
-        self._size = os.terminal_size((0, 0))
+        self._size = NO_SIZE
         self._live: Live | None = None
         self._lines: list[str] = []  # that stay above the view; printed together, since each print draws the view anew
         self._over = False
+        self._drawing = self._to_stop = False
 
     def work(self) -> None:
         """Until End, or until nobody is on the other end."""
@@ -74,7 +79,7 @@ class Painter:
                 if select.select([self._orders], [], [], LOOK_EVERY_S)[0]:
                     self._take_all()
                 woke = time.monotonic()
-                self._draw()
+                self._draw_whole()
                 now = time.monotonic()
                 pause_s = max(began + DRAW_EVERY_S, now + (now - woke) / COST_SHARE) - now
                 time.sleep(0.0 if self._over else max(0.0, pause_s))
@@ -102,6 +107,32 @@ class Painter:
             self._lines.append(message.text)
         elif isinstance(message, End):
             self._over = True
+
+    def stop_asked(self, *_: object) -> None:
+        """Ctrl-Z: at once, or when what is being drawn is whole."""
+        if self._drawing:
+            self._to_stop = True
+        else:
+            self._stand_still()
+
+    def _stand_still(self) -> None:
+        """Leave the terminal in order, stop as whoever knows nothing of Ctrl-Z does, and draw anew when continued."""
+        self._to_stop = False
+        mine = signal.signal(signal.SIGTSTP, signal.SIG_IGN)  # one at a time
+        if self._live is not None:
+            self._live.stop()
+            self._live = None
+        self._size = NO_SIZE
+        signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTSTP)  # comes back with SIGCONT
+        signal.signal(signal.SIGTSTP, mine)
+
+    def _draw_whole(self) -> None:
+        self._drawing = True
+        self._draw()
+        self._drawing = False
+        if self._to_stop:
+            self._stand_still()
 
     def _draw(self) -> None:
         if self._lines:

@@ -25,6 +25,7 @@ SAMPLES = 600  # of that window
 SAMPLES_A_LOOK = 50  # at most: a fast run's history is coarser, and costs no more
 REMEMBERED = 64  # ticks that TELEMETRY may lag behind
 MOST_NEW = 1000  # entries of one State, when the screen could not be told for a while
+SHOWN = 6  # decimals of s and deg that a chart could show: what is sent is read by eyes only
 DEG_PER_BAM = 360.0 / 2**32
 DEG_PER_RAD = 180.0 / math.pi
 SOURCES = {FRESH: "fresh", HELD: "held", ZERO: "zero"}
@@ -86,17 +87,17 @@ class Reader:
     def event(self, tick: int, code: int, a: int, b: int, origin: int) -> None:
         """Kept until the next State takes it."""
         self._overruns += code == events.OVERRUN
-        self._events.append((tick * self._period_s, code, a, b, origin))
+        self._events.append((self._time_s(tick), code, a, b, origin))
 
     def _sample(self, tick: int, motion: Motion) -> None:
         if not self._follows:
-            self._samples.append((tick * self._period_s, _degrees(motion), None))
+            self._samples.append((self._time_s(tick), _degrees(motion), None))
         elif self._pair(tick) and self._held_against is not None:
             self._samples.append(self._held_against)
         elif tick < self._due + self._patience:
             return
         else:
-            self._samples.append((tick * self._period_s, _degrees(motion), None))
+            self._samples.append((self._time_s(tick), _degrees(motion), None))
         self._due = tick + self._every
 
     def _pair(self, tick: int) -> bool:
@@ -117,7 +118,10 @@ class Reader:
 
     def _sample_of(self, tick: int, motion: Motion, reference_bam: tuple[int, int, int]) -> Sample:
         x, y, z = reference_bam
-        return tick * self._period_s, _degrees(motion), (x * DEG_PER_BAM, y * DEG_PER_BAM, z * DEG_PER_BAM)
+        return self._time_s(tick), _degrees(motion), _shown(x * DEG_PER_BAM, y * DEG_PER_BAM, z * DEG_PER_BAM)
+
+    def _time_s(self, tick: int) -> float:
+        return round(tick * self._period_s, SHOWN)
 
     def state(self, tick: int, motion: Motion) -> State:
         """What is new; call `told()` when it has reached the screen, otherwise it is part of the next one too."""
@@ -131,7 +135,7 @@ class Reader:
         late_ns = loop.lateness_ns
         answer_ns = answers.answer_ns if answers is not None else []
         return State(
-            tick * self._period_s,
+            self._time_s(tick),
             time.monotonic() - self._began_s,
             _degrees(motion),
             self._held_against,
@@ -179,4 +183,8 @@ class Reader:
 
 def _degrees(motion: Motion) -> Triple:
     x, y, z = motion.euler_rad.tolist()
-    return x * DEG_PER_RAD, y * DEG_PER_RAD, z * DEG_PER_RAD
+    return _shown(x * DEG_PER_RAD, y * DEG_PER_RAD, z * DEG_PER_RAD)
+
+
+def _shown(x: float, y: float, z: float) -> Triple:
+    return round(x, SHOWN), round(y, SHOWN), round(z, SHOWN)

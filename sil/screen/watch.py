@@ -7,6 +7,7 @@ elsewhere (sil.screen.painter). What a slow terminal does not take is dropped an
 from __future__ import annotations
 
 import atexit
+import errno
 import math
 import os
 import select
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING
 
 from sil.boards.process import child_environment
 from sil.screen import QUIET, VERBOSE, facts, messages
-from sil.screen.messages import End, Line, Message, Plan
+from sil.screen.messages import END_FRAME, SHOW_CURSOR, End, Line, Message, Plan
 from sil.screen.reading import Reader, plan_of
 from sil.signals import Motion
 from sil.sinks.events import describe, level_of
@@ -155,6 +156,7 @@ class Live(Lines):
         super().__init__(title, verbosity)
         self._painter: Painter | None = None
         self._can_start = True
+        self._cpus = os.sched_getaffinity(0)  # before the run takes one for itself
         self._waiting: list[str] = []  # lines for the next look: one datagram, however many
         self._last: tuple[int, Motion] | None = None
 
@@ -175,6 +177,15 @@ class Live(Lines):
         now = time.monotonic()
         if now >= self._next_s:
             self._look(tick, motion, now)
+
+    def close(self) -> None:
+        """Nothing more is drawn, and nothing waits: the run goes on."""
+        self._can_start = False
+        if self._painter is not None:
+            self._painter.kill()
+            self._painter = None
+        while self._waiting:
+            self._say(self._waiting.pop(0))
 
     def _look(self, tick: int, motion: Motion, now: float) -> None:
         if self._painter is None:
@@ -203,7 +214,7 @@ class Live(Lines):
         if not self._can_start:
             return
         try:
-            self._painter = Painter(wait=self._paced)
+            self._painter = Painter(self._cpus, wait=self._paced)
         except OSError as error:
             self._can_start = False
             self._say(f"no live view: cannot start the process that draws ({error.strerror})")
@@ -227,17 +238,30 @@ class Live(Lines):
             if self._last is not None:
                 self._tell(*self._last)
             self._painter.close()
-            self._painter = None
             self._dropped += len(self._waiting)
+            if self._painter.too_long:
+                super()._say(f"{self._painter.too_long} changes of the view were too long to be shown")
+            self._painter = None
         super()._over()
 
 
-class Painter:
-    """The other end of sil.screen.painter. `tell` never waits; the kernel's buffer is the bounded queue between."""
+def queue() -> tuple[socket.socket, socket.socket]:
+    """(the laboratory's end, the painter's end); takes the longest State there is, where the machine permits it."""
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, messages.BIGGEST // 2)  # the kernel doubles it
+    return ours, theirs
 
-    def __init__(self, wait: bool) -> None:
-        self._orders, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        command = [sys.executable, "-P", "-m", "sil.screen.painter"]
+
+class Painter:
+    """The other end of sil.screen.painter. `tell` never waits; the kernel's buffer is the bounded queue between.
+
+    cpus: where it may run. too_long: messages that no queue would have taken.
+    """
+
+    def __init__(self, cpus: set[int], wait: bool) -> None:
+        self.too_long = 0
+        self._orders, theirs = queue()
+        command = [sys.executable, "-P", "-m", "sil.screen.painter", *map(str, sorted(cpus))]
         with theirs:
             self._child = subprocess.Popen(
                 command, stdin=theirs.fileno(), stdout=subprocess.DEVNULL, env=child_environment(), close_fds=True
@@ -247,11 +271,13 @@ class Painter:
             select.select([self._orders], [], [], PATIENCE_S)
 
     def tell(self, message: Message) -> bool:
-        """False where it was dropped: the terminal takes nothing, or nobody draws any more."""
+        """False where it has to be told again: the terminal takes nothing, or nobody draws any more."""
         try:
             self._orders.send(messages.pack(message), socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL)
-        except OSError:
-            return False
+        except OSError as error:
+            if error.errno != errno.EMSGSIZE:
+                return False
+            self.too_long += 1  # and would be longer the next time
         return True
 
     def close(self) -> None:
@@ -262,6 +288,15 @@ class Painter:
             self._orders.shutdown(socket.SHUT_WR)  # says the same where the queue is full
         self._await_end()
         self._orders.close()  # not before: what it has not read yet would be lost
+
+    def kill(self) -> None:
+        """End it where it stands, without a wait for a last look, and put the terminal in order in its place."""
+        atexit.unregister(self.close)
+        self._child.kill()
+        self._child.wait()
+        self._orders.close()
+        if _takes_more():
+            print(f"{END_FRAME}{SHOW_CURSOR}", file=sys.stderr, flush=True)
 
     def _await_end(self) -> None:
         give_up = time.monotonic() + PATIENCE_S
@@ -289,4 +324,4 @@ def _takes_more() -> bool:
 
 def _show_cursor() -> None:
     if _takes_more():
-        print("\x1b[?25h", end="", file=sys.stderr, flush=True)
+        print(SHOW_CURSOR, end="", file=sys.stderr, flush=True)

@@ -16,26 +16,46 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
 from subprocesses import alive, children_of, quiet
 
 HIDE_CURSOR, SHOW_CURSOR = b"\x1b[?25l", b"\x1b[?25h"
+BEGIN_FRAME = b"\x1b[?2026h"
+BROKEN_VIEW = """
+import os
+from sil import cli
+from sil.screen.reading import Reader
+
+whole = Reader.state
+
+def state(*arguments):
+    if os.path.exists("break-it"):
+        raise RuntimeError("broken on purpose")
+    return whole(*arguments)
+
+Reader.state = state
+cli.main()
+"""
 PACED = ("rigid-open-loop", "--clock", "scaled:200", "--set", "duration_s=260")  # 1.3 s, without a board
 
 
 class Terminal:
-    """`sil run` whose standard error is a pseudo-terminal; standard output is kept apart."""
+    """`sil run` (by `script`, where there is one) whose standard error is a pseudo-terminal; stdout is kept apart."""
 
-    def __init__(self, folder: Path, arguments: tuple[str, ...], size: tuple[int, int], **env: str) -> None:
+    def __init__(
+        self, folder: Path, arguments: tuple[str, ...], size: tuple[int, int], script: str, **env: str
+    ) -> None:
         self._master, slave = os.openpty()
         self.resize(size)
         self.seen = b""
         self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "sil", "run", *arguments],
+            [sys.executable, "-P", *(("-c", script) if script else ("-m", "sil")), "run", *arguments],
             cwd=folder,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=slave,
             env={**os.environ, "TERM": "xterm-256color", **env},
+            process_group=0,  # what Ctrl-Z stops
         )
         os.close(slave)
 
@@ -71,8 +91,10 @@ class Terminal:
 
 
 @contextmanager
-def terminal(folder: Path, *arguments: str, size: tuple[int, int] = (100, 30), **env: str) -> Iterator[Terminal]:
-    made = Terminal(folder, arguments, size, **env)
+def terminal(
+    folder: Path, *arguments: str, size: tuple[int, int] = (100, 30), script: str = "", **env: str
+) -> Iterator[Terminal]:
+    made = Terminal(folder, arguments, size, script, **env)
     try:
         yield made
     finally:
@@ -163,3 +185,60 @@ def test_a_painter_that_dies_does_not_end_the_run(tmp_path: Path) -> None:
         os.kill(painter, signal.SIGKILL)
         out = screen.end()
     assert screen.process.returncode in (0, 3) and "rms torque" in out
+
+
+def test_a_view_that_fails_ends_before_it_is_said_and_nothing_is_drawn_over_what_follows(tmp_path: Path) -> None:
+    """Protects: a broken view costs the view: the cursor is back, then the reason, then the summary, and no frame."""
+    said = b"view: RuntimeError: broken on purpose; the run goes on without it"
+    with terminal(tmp_path, "rigid-open-loop", "--clock", "realtime", script=BROKEN_VIEW) as screen:
+        screen.read_until(lambda: b"wake-up late" in screen.seen)
+        (tmp_path / "break-it").touch()
+        screen.read_until(lambda: said in screen.seen)
+        assert not children_of(screen.process.pid), "nobody draws any more"
+        screen.process.send_signal(signal.SIGINT)
+        out = screen.end()
+    assert out.startswith("interrupted")
+    before, _, after = screen.seen.partition(said)
+    assert before.rindex(SHOW_CURSOR) > before.rindex(HIDE_CURSOR)
+    assert before.endswith(b"\n"), "a line of its own"
+    assert BEGIN_FRAME not in after and after.strip() == b""
+
+
+def test_ctrl_z_shows_the_cursor_and_fg_the_view(tmp_path: Path) -> None:
+    """Protects: the shell gets a terminal in order while the run is stopped, and the view is back afterwards."""
+    with terminal(tmp_path, "rigid-open-loop", "--clock", "realtime") as screen:
+        screen.read_until(lambda: b"wake-up late" in screen.seen)
+        (painter,) = children_of(screen.process.pid)
+        os.killpg(screen.process.pid, signal.SIGTSTP)
+        screen.read_until(lambda: is_stopped(screen.process.pid) and is_stopped(painter))
+        screen.read_until(lambda: screen.seen.rindex(SHOW_CURSOR) > screen.seen.rindex(HIDE_CURSOR), 5.0)
+        stopped_at = len(screen.seen)
+        os.killpg(screen.process.pid, signal.SIGCONT)
+        screen.read_until(lambda: b"wake-up late" in screen.seen[stopped_at:])
+        screen.process.send_signal(signal.SIGINT)
+        out = screen.end()
+    assert out.startswith("interrupted")
+    assert HIDE_CURSOR in screen.seen[stopped_at:]
+    assert b"\x1b[2J" not in screen.seen, "what the shell wrote stays"
+    assert screen.seen.rindex(SHOW_CURSOR) > screen.seen.rindex(HIDE_CURSOR)
+
+
+def is_stopped(pid: int) -> bool:
+    """By Ctrl-Z."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+
+
+def test_the_view_is_drawn_on_the_cpus_that_the_run_was_started_on(tmp_path: Path) -> None:
+    """Protects: `taskset` holds for all of `sil run`; a CPU that the run takes for itself is not for drawing alone."""
+    usable = os.sched_getaffinity(0)
+    if len(usable) < 2:
+        pytest.skip("with one CPU there is nothing to choose")
+    for started_on, lab_cpu in (({min(usable)}, min(usable)), (usable, max(usable))):
+        os.sched_setaffinity(0, started_on)
+        try:
+            with terminal(tmp_path, *PACED, "--set", f"clock.lab_cpu={lab_cpu}") as screen:
+                screen.read_until(lambda: b"wake-up late" in screen.seen)
+                (painter,) = children_of(screen.process.pid)
+                assert os.sched_getaffinity(painter) == started_on
+        finally:
+            os.sched_setaffinity(0, usable)

@@ -15,7 +15,7 @@ import pytest
 
 from protocol import events
 from sil.scenario import load_scenario
-from sil.screen import NORMAL, QUIET, VERBOSE, new_watch, watch
+from sil.screen import NORMAL, QUIET, VERBOSE, messages, new_watch, watch
 from sil.watch import Watch
 
 
@@ -103,6 +103,44 @@ def test_a_paced_run_does_not_wait_for_who_reads_its_lines(monkeypatch: pytest.M
         os.read(pipe, 1 << 20)
         made_watch.note("read again")
         assert os.read(pipe, 1 << 20) == b"read again\n"
+
+
+def test_what_no_queue_takes_is_counted_and_not_told_again() -> None:
+    """Protects: one message that is too long does not end the view for good, each later one being longer still."""
+    painter = watch.Painter(os.sched_getaffinity(0), wait=False)
+    try:
+        assert painter.tell(messages.Line("x" * messages.BIGGEST))
+        assert painter.too_long == 1
+        assert painter.tell(made.plan())
+        assert painter.too_long == 1
+    finally:
+        painter.kill()
+
+
+def test_what_was_too_long_is_said_at_the_end(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Protects: a view that lacks something says so."""
+    monkeypatch.setattr(watch, "Painter", TooLong)
+    view = watch.Live("name", NORMAL)
+    view.plugged(load_scenario("rigid-open-loop"), made.rig(board=False, paced=True))
+    view.stage("seal")
+    assert capsys.readouterr().err == "3 changes of the view were too long to be shown\n"
+
+
+class TooLong:
+    """A painter whose every message is too long."""
+
+    too_long = 3
+
+    def __init__(self, cpus: set[int], wait: bool) -> None:
+        pass
+
+    def tell(self, message: messages.Message) -> bool:
+        return True
+
+    def close(self) -> None:
+        pass
 
 
 def test_an_unreadable_path_is_no_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
