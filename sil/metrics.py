@@ -14,14 +14,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from protocol import events
+from sil.plain import plain
 from sil.runs import Array, Run, wrapped_deg
 from sil.sinks.journal import Fate
 
 DIVERGED_deg = 80.0  # the scenario's metrics.diverged_deg says otherwise
 MISMATCH_LIMIT_deg = 1e-5  # board's reference against ours: 100 times the LSB of an angle on the wire
 SETTLED_FRACTION, SETTLED_FLOOR_deg = 0.02, 0.1  # settled: within 2 % of the step; never asked closer than this
+AXIS_NAMES = ("roll", "pitch", "yaw")
 PARTS = {"roll": 0, "x": 0, "pitch": 1, "y": 1, "yaw": 2, "z": 2}
 MISMATCH = "reference_mismatch_deg"
+SETTLING, NEVER_SETTLED = "settling_s", "never_settled"
+DWELL_ticks = 10  # settled: inside the band for that long at least, and for a time constant of the reference
 
 
 class Judgement(NamedTuple):
@@ -29,9 +33,10 @@ class Judgement(NamedTuple):
 
     metric: str
     requirement: str  # such as "rms_error_deg.roll < 0.5"
-    value: float | None
+    value: float | None  # None: there is none, see reason
     passed: bool
     margin: float | None
+    reason: str = ""  # why there is no finite value: never, no step, none, not a number
 
 
 def measure(run: Run) -> dict[str, Any]:
@@ -49,7 +54,7 @@ def measure(run: Run) -> dict[str, Any]:
     error = run.error_deg[rows]
     if not np.isfinite(run.reference_deg).any():
         error = run.setpoint_error_deg[rows]  # no reference model in this run: the set-point is the reference
-    torque = run.applied_Nm[rows]
+    torque, dwell = run.applied_Nm[rows], dwell_ticks(run)
     return {
         "from_tick": first,
         "rms_error_deg": _rms(error),
@@ -59,7 +64,7 @@ def measure(run: Run) -> dict[str, Any]:
         "rms_torque_Nm": _rms(torque),
         "peak_momentum_Nms": _peak(run.momentum_Nms[rows]),
         "effort_Nms": _effort(torque, run.period_s),
-        "settling_s": [settling_s(run, axis, first) for axis in range(3)],
+        SETTLING: [settling_s(run, axis, first, dwell) for axis in range(3)],
         "diverged_at_s": diverged_at_s(run, settings.get("diverged_deg", DIVERGED_deg)),
         MISMATCH: reference_mismatch_deg(run),
         **_counts(run),
@@ -75,18 +80,31 @@ def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | 
     return float(run.t_s[np.argmax(bad)]) if bad.any() else None
 
 
-def settling_s(run: Run, axis: int, from_tick: int = 0) -> float | None:
+def dwell_ticks(run: Run) -> int:
+    """How long an axis has to stay in its band to have settled: DWELL_ticks, or 1/wn of the reference if longer.
+
+    wn is guidance.wn_radps. A law without a reference model has to follow the same set-points, so it counts there too.
+    """
+    wn_radps = float((run.scenario.get("guidance") or {}).get("wn_radps") or math.inf)
+    return max(DWELL_ticks, math.ceil(1.0 / (wn_radps * run.period_s)))
+
+
+def settling_s(run: Run, axis: int, from_tick: int = 0, dwell: int = DWELL_ticks) -> float | None:
     """How long one axis (0 roll, 1 pitch, 2 yaw) takes to settle after its set-point changed, s; the longest of all.
 
-    A change at tick k >= from_tick is a step of size s = |new - old|. The axis has settled at the first tick from which
-    on |attitude - set-point| stays within max(2 % of s, 0.1 deg) up to the next change of any axis' set-point, or to
-    the end of the run: that the turn of another axis pushes it out again later is coupling, not settling. It has until
-    its own next change. The time counts from tick k, in whole periods. With from_tick 0 the start of the run is a step
-    from the attitude it starts at.
+    A change at tick k >= from_tick is a step of size s = |new - old|. What follows, up to the axis' own next change or
+    the end of the run, is cut into stretches by the changes of the other axes. The axis settles at tick j, if
 
-    None: the axis has no step. Infinite (null in JSON): it did not settle after one of them; no limit from above is
-    met then. A last step that the end of the run cut off sooner than the slowest of the others settled says nothing,
-    and is left out.
+    - |attitude - set-point| is within max(2 % of s, 0.1 deg) at every tick from j to the end of j's stretch, and
+    - that is at least `dwell` ticks long, so that passing through the band is not taken for staying in it,
+
+    and the first such j counts, from k, in whole periods. A step of another axis may so push this one out of its band
+    again: that is coupling, not settling. And if it was not settled before that, it may settle in a later stretch.
+    With from_tick 0 the start of the run is a step from the attitude it starts at.
+
+    None: the axis has no step. Infinite (null in JSON, the axis in never_settled): it did not settle after one of them;
+    no limit from above is met then. A last step that the end of the run left fewer ticks than the slowest of the others
+    took, with its dwell, says nothing, and is left out if it did not settle.
     """
     start = int(np.searchsorted(run.tick, from_tick))
     attitude, setpoints = run.attitude_deg[start:], run.setpoint_deg[start:]
@@ -101,22 +119,40 @@ def settling_s(run: Run, axis: int, from_tick: int = 0) -> float | None:
     ends = np.append(np.flatnonzero(steps.any(axis=1)), len(error))
     bands = np.maximum(SETTLED_FRACTION * steps[changes, axis], SETTLED_FLOOR_deg)
     spans = zip(changes, [*changes[1:], len(error)], bands, strict=True)
-    ticks = [_ticks_to_settle(error[k:end], ends[(ends > k) & (ends <= end)] - k, band) for k, end, band in spans]
+    ticks = [
+        _ticks_to_settle(error[k:end], ends[(ends > k) & (ends <= end)] - k, band, dwell) for k, end, band in spans
+    ]
     *others, last = ticks
-    if math.isinf(last) and others and len(error) - changes[-1] < max(others) < math.inf:
+    if math.isinf(last) and others and len(error) - changes[-1] < max(others) + dwell < math.inf:
         ticks = others
     return float(max(ticks) * run.period_s)
 
 
-def _ticks_to_settle(error: Array, ends: Array, band: float) -> float:
-    """First index from which on error is within the band up to one of `ends` (in rising order); infinite: never."""
+def _ticks_to_settle(error: Array, ends: Array, band: float, dwell: int) -> float:
+    """First index from which on error is within the band to the next of `ends` (in rising order), for `dwell` or more.
+
+    Infinite: there is none.
+    """
     outside = np.flatnonzero(~(error <= band))  # what is not a number is outside
-    for end in ends:
-        so_far = outside[outside < end]
-        settled = int(so_far[-1]) + 1 if so_far.size else 0
-        if settled < end:
+    for start, end in zip([0, *ends[:-1]], ends, strict=True):
+        before = outside[(start <= outside) & (outside < end)]
+        settled = int(before[-1]) + 1 if before.size else int(start)
+        if end - settled >= dwell:
             return settled
     return math.inf
+
+
+def never_settled(metrics: Mapping[str, Any]) -> list[str]:
+    """Axes whose settling_s is infinite, by name: JSON has null for that and for an axis without a step."""
+    if NEVER_SETTLED in metrics:
+        return list(metrics[NEVER_SETTLED])
+    values = metrics.get(SETTLING) or ()
+    return [name for name, value in zip(AXIS_NAMES, values, strict=False) if value == math.inf]
+
+
+def as_json(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """The metrics as plain JSON values, and never_settled, the names of the axes that did not settle."""
+    return {**plain(metrics), NEVER_SETTLED: never_settled(metrics)}
 
 
 def reference_mismatch_deg(run: Run) -> float | None:
@@ -144,11 +180,19 @@ def judge(require: Iterable[Any], metrics: Mapping[str, Any]) -> list[Judgement]
 
 
 def value_of(metrics: Mapping[str, Any], name: str) -> float | None:
-    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `diverged_at_s`; None: there is none."""
+    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `diverged_at_s`; None: there is none.
+
+    `settling_s.max` is None only if no axis had a step, and infinite if one never settled. metrics: from measure() or
+    as they stand in summary.json, where never_settled tells what null means.
+    """
     key, _, part = name.partition(".")
-    if key not in metrics:
-        raise ValueError(f"metric: expected one of {', '.join(metrics)}, got {name!r}")
+    known = [each for each in metrics if each != NEVER_SETTLED]
+    if key not in known:
+        raise ValueError(f"metric: expected one of {', '.join(known)}, got {name!r}")
     value = metrics[key]
+    if key == SETTLING and value is not None:
+        never = [PARTS[axis] for axis in never_settled(metrics)]
+        value = [math.inf if axis in never else number for axis, number in enumerate(value)]
     if not isinstance(value, Sequence | np.ndarray):
         return None if value is None else float(value)
     if part == "max":
@@ -172,13 +216,23 @@ def _judged(line: Mapping[str, Any], value: float | None) -> Judgement:
     inclusive = line.get("between") is not None
     if low is None and high is None:
         raise ValueError(f"require: expected below, above or between for {line['metric']}")
+    sentence, reason = _sentence(line["metric"], low, high, inclusive), _reason(line["metric"], value)
     if value is None or math.isnan(value):
-        return Judgement(line["metric"], _sentence(line["metric"], low, high, inclusive), value, False, None)
+        return Judgement(line["metric"], sentence, value, False, None, reason)
     margins = [high - value] if high is not None else []
     margins += [value - low] if low is not None else []
     margin = min(margins)
     passed = margin >= 0 if inclusive else margin > 0
-    return Judgement(line["metric"], _sentence(line["metric"], low, high, inclusive), value, passed, margin)
+    return Judgement(line["metric"], sentence, value, passed, margin, reason)
+
+
+def _reason(metric: str, value: float | None) -> str:
+    """What to say instead of a number; "" where there is one."""
+    if value is None:
+        return {SETTLING: "no step", "diverged_at_s": "never"}.get(metric.partition(".")[0], "none")
+    if math.isnan(value):
+        return "not a number"
+    return "" if math.isfinite(value) else "never" if metric.startswith(SETTLING) else "infinite"
 
 
 def _sentence(metric: str, low: float | None, high: float | None, inclusive: bool) -> str:

@@ -12,13 +12,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from protocol import events, frames
 from protocol.links import LinkError
 from sil import lateness
 from sil.checks import check
-from sil.metrics import Judgement, judge, measure
+from sil.metrics import Judgement, as_json, judge, measure
+from sil.plain import plain
 from sil.realtime import Granted, granted, refuse_impossible, suspended_ns
 from sil.rig import Rig, assemble, record_config, user_law_spec
 from sil.runs import open_run
@@ -242,10 +241,8 @@ def new_run_dir(name: str, out: Path | None) -> tuple[Path, bool]:
 def next_run_dir(parent: Path, name: str) -> Path:
     """Makes parent/NAME-NNN, the next free number. Raises OSError."""
     parent.mkdir(exist_ok=True)
-    numbers = [
-        int(p.name.removeprefix(f"{name}-")) for p in parent.glob(f"{name}-*") if p.name[len(name) + 1 :].isdigit()
-    ]
-    number = max(numbers, default=0)
+    endings = [path.name[len(name) + 1 :] for path in parent.glob(f"{name}-*")]
+    number = max((int(text) for text in endings if text.isascii() and text.isdigit()), default=0)
     while True:
         number += 1
         try:
@@ -277,8 +274,8 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "reason": outcome.reason,
         "ticks": outcome.ticks,
         "duration_s": outcome.ticks * scenario.period_ns * 1e-9,
-        "metrics": _plain(metrics),
-        "require": [_plain(judgement._asdict()) for judgement in judgements],
+        "metrics": as_json(metrics),
+        "require": [plain(judgement._asdict()) for judgement in judgements],
         "not_a_number": not_a_number,
         "link": link,
         "timing": timing,
@@ -338,14 +335,3 @@ def _timing(scenario: Scenario, outcome: Outcome, report: SealReport) -> dict[st
         "suspended_s": outcome.suspended_s,
         "granted": got._asdict() if got is not None else None,
     }
-
-
-def _plain(value: Any) -> Any:
-    """JSON has no NaN: it becomes null; arrays and tuples become lists."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(item) for item in value]
-    if isinstance(value, float | np.floating):
-        return float(value) if np.isfinite(value) else None
-    return value.item() if isinstance(value, np.generic) else value

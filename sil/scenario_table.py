@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from sil.plain import flat
 from sil.scenario import Scenario, load_scenario, load_values
 from sil.scenarios import list_scenarios
 
@@ -22,19 +23,11 @@ and nothing else differs; `law.params.*` are compared with the defaults of the l
 def non_defaults(scenario: Scenario) -> dict[str, Any]:
     """Key to value of everything that is not the default; `require` and `about` left out."""
     plain = load_values({"law": {"name": scenario.law.name}})
-    mine, default = dict(_flat(scenario.resolved())), dict(_flat(plain.resolved()))
+    mine, default = flat(scenario.resolved()), flat(plain.resolved())
     if scenario.board != "none":
         default["law.name"] = ""  # always worth a line
     left_out = ("name", "about", "require")
     return {key: value for key, value in mine.items() if value != default.get(key) and key not in left_out}
-
-
-def _flat(values: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in values.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value
 
 
 def markdown() -> str:

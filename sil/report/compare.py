@@ -16,7 +16,7 @@ from rich import box
 from rich.table import Table
 from rich.text import Text
 
-from sil.metrics import measure
+from sil.metrics import as_json, measure
 from sil.report.facts import labels, law_of
 from sil.report.look import AXIS_NAMES
 from sil.report.signals import controlled
@@ -66,7 +66,7 @@ class Row(NamedTuple):
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values. What did not settle is null in settling_s, and false in `settled` (null: no step)."""
         settled = [None if s is None else math.isfinite(s) for s in self.metrics["settling_s"] or [None] * 3]
-        return {**self._asdict(), "metrics": {**_plain(self.metrics), "settled": settled}}
+        return {**self._asdict(), "metrics": {**as_json(self.metrics), "settled": settled}}
 
 
 def rows(runs: Sequence[Run], verdicts: Mapping[int, str] | None = None) -> list[Row]:
@@ -109,7 +109,7 @@ def notes(found: Sequence[Row]) -> Iterator[str]:
     if any(_best(found, column.metric, axis) is not None for column in COLUMNS for axis in range(3)):
         yield "bold: the smallest among the runs that followed a set-point and did not diverge"
     if any(math.inf in (row.metrics["settling_s"] or ()) for row in found):
-        yield "never: not within 2 % of the step (at least 0.1 deg) before the next one"
+        yield "never: it did not stay within 2 % of the step (at least 0.1 deg) before the next one"
 
 
 def csv(found: Sequence[Row]) -> str:
@@ -144,15 +144,6 @@ def _row(run: Run, label: str, verdict: str | None) -> Row:
         len(run) * run.period_s,
         metrics,
     )
-
-
-def _plain(value: Any) -> Any:
-    """JSON knows no NaN: null."""
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 # -- cells -------------------------------------------------------------------------------------------------------------

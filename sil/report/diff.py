@@ -8,7 +8,7 @@ the files are the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import Any, NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from protocol import frames
 from protocol.law_tables import COMMON, LAWS, ROW_WORDS, TELEMETRY_COMMON, LawTable
+from sil.plain import flat
 from sil.runs import PacketRow, Run, wrapped_deg
 from sil.sinks.events import describe
 
@@ -240,20 +241,10 @@ def _bits(rows: Any) -> list[bytes]:
 
 def identity_difference(a: Run, b: Run) -> Iterator[tuple[str, Any, Any]]:
     """What the runs say of themselves: (key, in a, in b) where that differs."""
-    x, y = ({**_flat(run.meta), **_flat(run.scenario, "scenario.")} for run in (a, b))
+    x, y = ({**flat(run.meta), **flat(run.scenario, "scenario.")} for run in (a, b))
     for key in dict.fromkeys([*x, *y]):
         if x.get(key, ABSENT) != y.get(key, ABSENT):
             yield key, x.get(key, ABSENT), y.get(key, ABSENT)
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in content.items():
-        if isinstance(value, Mapping):
-            flat |= _flat(value, f"{prefix}{key}.")
-        else:
-            flat[prefix + str(key)] = value
-    return flat
 
 
 # -- text --------------------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from sil.plain import flat
 from sil.report.signals import controlled
 from sil.runs import Run
 
@@ -56,11 +57,11 @@ def labels(runs: Sequence[Run]) -> list[str]:
 
 def _one_key(runs: Sequence[Run]) -> list[str]:
     """The one key of the scenario that tells all of them apart, with its values; [] where no single one does."""
-    flats = [_flat(run.scenario) for run in runs]
-    keys = dict.fromkeys(key for flat in flats for key in flat)
+    flats = [flat(run.scenario) for run in runs]
+    keys = dict.fromkeys(key for each in flats for key in each)
     counting = [key for key in keys if not any(f"{key}.".startswith(f"{other}.") for other in _NOT_THE_RUN)]
     for key in counting:
-        said = [f"{key.rpartition('.')[2]} {_short(flat.get(key))}" for flat in flats]
+        said = [f"{key.rpartition('.')[2]} {_short(each.get(key))}" for each in flats]
         if len(set(said)) == len(said) and max(map(len, said)) <= _KEY_CHARACTERS:
             return said
     return []
@@ -111,13 +112,6 @@ def _same(words: list[list[str]]) -> list[list[int]]:
     for i, said in enumerate(words):
         groups.setdefault(tuple(said), []).append(i)
     return [group for group in groups.values() if len(group) > 1]
-
-
-def _flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    flat: dict[str, Any] = {}
-    for key, value in content.items():
-        flat |= _flat(value, f"{prefix}{key}.") if isinstance(value, Mapping) else {f"{prefix}{key}": value}
-    return flat
 
 
 def _agreed(runs: Sequence[Run], what: Callable[[Run], Any]) -> list[Any]:

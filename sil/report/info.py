@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
 from protocol.events import name_of
 from sil import mcap_file
-from sil.metrics import judge, measure
+from sil.metrics import AXIS_NAMES, NEVER_SETTLED, SETTLING, as_json, judge, measure
+from sil.plain import plain
 from sil.runs import Run
 
 _TYPES = {1: "CONFIG", 2: "SAMPLE", 3: "COMMAND", 4: "TELEMETRY", 5: "EVENT"}
@@ -32,7 +32,7 @@ def info(run: Run) -> dict[str, Any]:
         "law": {**_mapping(run.meta.get("law")), **_mapping(run.scenario.get("law"))} if run.config_words else None,
         "seed": run.meta.get("seed"),
         "identity": {key: value for key, value in sorted(run.meta.items()) if key not in ("name", "law", "seed")},
-        "metrics": metrics,
+        "metrics": as_json(metrics),
         "require": [judgement._asdict() for judgement in judge(run.scenario.get("require") or (), metrics)],
         "packets": _packets(run),
         "sessions": run.sessions,
@@ -40,8 +40,8 @@ def info(run: Run) -> dict[str, Any]:
         "host": _host(run),
         "sha256": hashlib.sha256(run.path.read_bytes()).hexdigest(),
     }
-    plain: dict[str, Any] = _plain(content)
-    return plain
+    found: dict[str, Any] = plain(content)
+    return found
 
 
 def text(content: Mapping[str, Any]) -> str:
@@ -58,7 +58,7 @@ def text(content: Mapping[str, Any]) -> str:
     ]
     lines += [_row(key, _short(value)) for key, value in content["identity"].items() if value not in (None, "", {})]
     lines += [_row("sha256", content["sha256"]), "", _heading("roll", "pitch", "yaw")]
-    lines += [_metric(name, value) for name, value in content["metrics"].items()]
+    lines += [_metric(name, value) for name, value in _named(content["metrics"]).items()]
     lines += _block("requirements", [_required(line) for line in content["require"]])
     lines += _block("frames", [f"{key:<24}{count:>8}" for key, count in content["packets"].items()])
     lines += _block("events", [_event_line(name, entry) for name, entry in content["events"].items()])
@@ -106,20 +106,18 @@ def _mapping(value: Any) -> dict[str, Any]:
     return dict(value) if isinstance(value, Mapping) else {}
 
 
-def _plain(value: Any) -> Any:
-    """JSON knows no NaN: null."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 # -- text --------------------------------------------------------------------------------------------------------------
 
 
 def _row(key: str, value: Any) -> str:
     return f"{key:<26}{value}"
+
+
+def _named(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """What never settled says so in its place."""
+    shown = {name: value for name, value in metrics.items() if name != NEVER_SETTLED}
+    settling = zip(AXIS_NAMES, metrics[SETTLING], strict=True)
+    return {**shown, SETTLING: ["never" if axis in metrics[NEVER_SETTLED] else value for axis, value in settling]}
 
 
 def _heading(*columns: str) -> str:
@@ -139,7 +137,8 @@ def _number(value: Any) -> str:
 
 
 def _required(line: Mapping[str, Any]) -> str:
-    return f"{'passed' if line['passed'] else 'FAILED':<8}{line['requirement']}   got {_number(line['value'])}"
+    got = line["reason"] or _number(line["value"])
+    return f"{'passed' if line['passed'] else 'FAILED':<8}{line['requirement']}   got {got}"
 
 
 def _event_line(name: str, entry: Mapping[str, Any]) -> str:

@@ -106,13 +106,14 @@ def _wrong(case: Case, outcome: str, kind: str, message: str) -> Case:
 
 def _judged(line: Mapping[str, Any]) -> Case:
     value, margin = line["value"], line["margin"]
-    facts = {"metric": line["metric"], "value": _number(value)}
+    said = line.get("reason") or _number(value)
+    facts = {"metric": line["metric"], "value": said}
     if margin is not None:
         facts["margin"] = _number(margin)
     case = Case(line["requirement"], facts=facts)
     if line["passed"]:
         return case
-    got = f"{line['requirement']}: got {_number(value)}" + (f", margin {margin:.4g}" if margin is not None else "")
+    got = f"{line['requirement']}: got {said}" + (f", margin {margin:.4g}" if margin is not None else "")
     return _wrong(case, "failure", "requirement", got)
 
 

@@ -56,14 +56,14 @@ def replay(
         if junit is not None:
             page.write(_junit(run, report, board))
     if as_json:
-        print_json(_plain(report))
+        print_json(_as_dict(report))
     else:
         for line in [*_apart(report), *_found(report)]:
             print(line)
     return EXIT_OK if report.identical else EXIT_REQUIREMENT
 
 
-def _plain(report: Report) -> dict[str, Any]:
+def _as_dict(report: Report) -> dict[str, Any]:
     from sil.replay import decoded
 
     first = report.first

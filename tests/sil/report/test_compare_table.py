@@ -69,7 +69,7 @@ def test_rows_say_what_became_of_each_run(runs: list[Run]) -> None:
     assert "at 50 s" in text
     assert "1 late" in text
     assert "never" in text
-    assert any(line.startswith("never: not within 2 %") for line in compare.notes(found))
+    assert any(line.startswith("never: it did not stay within 2 %") for line in compare.notes(found))
 
 
 def test_the_smallest_is_marked_only_among_runs_that_can_be_compared(runs: list[Run], tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from pathlib import Path
@@ -13,7 +14,9 @@ import numpy as np
 import pytest
 from synthetic import synthetic_journal
 
-from sil.metrics import MISMATCH_LIMIT_deg, judge, measure, settling_s, value_of
+from sil.campaign.records import flat_metrics
+from sil.metrics import MISMATCH_LIMIT_deg, as_json, dwell_ticks, judge, measure, settling_s, value_of
+from sil.runner import next_run_dir
 from sil.runs import Run, open_run
 from sil.scenario_metrics import METRICS as METRIC_NAMES
 from sil.sinks.seal import seal
@@ -196,6 +199,28 @@ def test_another_axis_turn_is_not_settling() -> None:
     assert settling_s(run, 0) == 80.0
 
 
+def test_passing_through_the_band_is_not_settling() -> None:
+    """An oscillation that happens to cross the set-point just before another axis turns has not settled there."""
+    run = stepping({100: (10, 0, 0), 150: (10, 30, 0), 200: (10, 0, 0)}, 300)
+    run.attitude_deg[100:, 0] = 14.0
+    run.attitude_deg[149, 0] = run.attitude_deg[191:200, 0] = 10.0
+    assert settling_s(run, 0) == math.inf
+    run.attitude_deg[190, 0] = 10.0  # ten ticks: it stayed
+    assert settling_s(run, 0) == 90.0
+    assert settling_s(run, 0, dwell=11) == math.inf
+
+
+def test_the_dwell_is_ten_ticks_or_a_time_constant_of_the_reference() -> None:
+    of = [SimpleNamespace(period_s=0.5, scenario={"guidance": {"wn_radps": wn}}) for wn in (0.15, 1.0)]
+    assert [dwell_ticks(each) for each in of] == [14, 10]  # type: ignore[arg-type]
+    assert dwell_ticks(SimpleNamespace(period_s=0.5, scenario={})) == 10  # type: ignore[arg-type]
+
+
+def test_a_last_step_without_time_to_stay_says_nothing_either() -> None:
+    """It came into its band as fast as the others; the run ended before it could show that it stays."""
+    assert settling_s(stepping({100: (10, 0, 0), 200: (-10, 0, 0)}, 225), 0) == 20.0
+
+
 def test_a_step_cut_off_by_the_end_says_nothing_if_it_had_less_time_than_the_others_took() -> None:
     assert settling_s(stepping({100: (10, 0, 0), 200: (-10, 0, 0)}, 215), 0) == 20.0
     assert settling_s(stepping({200: (-10, 0, 0)}, 215), 0) == math.inf
@@ -215,6 +240,25 @@ def test_the_largest_leaves_out_axes_without_a_step() -> None:
     assert math.isnan(value_of({"rms_error_deg": [0.1, math.nan, 0.2]}, "rms_error_deg.max") or 0.0)
 
 
+def test_one_axis_that_never_settled_makes_the_largest_infinite_in_json_too() -> None:
+    """JSON has null for an axis without a step and for one that never settled; the names tell them apart."""
+    metrics = {"settling_s": [None, math.inf, 2.0], "missed": 0}
+    read = json.loads(json.dumps(as_json(metrics), allow_nan=False))
+    assert read == {"settling_s": [None, None, 2.0], "missed": 0, "never_settled": ["pitch"]}
+    for each in (metrics, read):
+        values = [value_of(each, f"settling_s.{part}") for part in ("roll", "pitch", "yaw", "max")]
+        assert values == [None, math.inf, 2.0, math.inf]
+    with pytest.raises(ValueError, match="expected one of settling_s, missed, got 'never_settled'"):
+        value_of(read, "never_settled")
+
+
+def test_a_judgement_says_why_there_is_no_number() -> None:
+    metrics = {"settling_s": [None, math.inf, 2.0], "rms_error_deg": [math.nan] * 3, "diverged_at_s": None}
+    names = ("settling_s.roll", "settling_s.max", "settling_s.yaw", "rms_error_deg.max", "diverged_at_s")
+    found = judge([{"metric": name, "below": 9.0} for name in names], metrics)
+    assert [each.reason for each in found] == ["no step", "never", "", "not a number", "never"]
+
+
 def test_effort_is_the_integral_of_the_torque_that_acted(run: Run) -> None:
     metrics = measure(run)
     assert metrics["effort_Nms"] == pytest.approx((np.abs(run.applied_Nm[20:]).sum(axis=0) * 0.5).tolist())
@@ -224,3 +268,15 @@ def test_effort_is_the_integral_of_the_torque_that_acted(run: Run) -> None:
 def test_a_requirement_may_name_every_metric(run: Run) -> None:
     """A metric that measure() knows and the scenario refuses could never be required."""
     assert set(measure(run)) - {"from_tick"} <= set(METRIC_NAMES)
+
+
+def test_a_sweep_leaves_the_names_of_axes_out_of_its_columns() -> None:
+    columns = flat_metrics(as_json({"settling_s": [1.0, math.inf, 2.0], "missed": 0}))
+    assert set(columns) == {"settling_s.roll", "settling_s.pitch", "settling_s.yaw", "settling_s.max", "missed"}
+
+
+def test_the_next_run_directory_counts_numbers_only(tmp_path: Path) -> None:
+    """A superscript is a digit to str.isdigit, and none to int; it must not end in a traceback."""
+    for name in ("x-007", "x-\u00b2", "x-old", "x-\u0664\u0662"):
+        (tmp_path / name).mkdir()
+    assert next_run_dir(tmp_path, "x") == tmp_path / "x-008"
