@@ -7,6 +7,7 @@ import math
 import socket
 
 import made
+import numpy as np
 import pytest
 
 from sil.scenario import load_scenario
@@ -52,7 +53,7 @@ def test_a_screen_that_is_never_told_costs_bounded_memory() -> None:
     reader = Reader(load_scenario("mrac-rs232", ["duration_s=100000"]), rig, "set-point")
     first, last = 1_000_000, 1_005_000
     for k in range(first, last):
-        reader.take(k, made.motion(-k))
+        reader.take(k, made.motion(k)._replace(euler_rad=np.full(3, -k / 7e5)))
         reader.event(k, 0x0101, -k, k, 0)
         rig.loop.lateness_ns.append(1_000_000_000 + k)
         rig.answers.answer_ns.append(1_000_000_000 + k)

@@ -112,6 +112,7 @@ def test_what_no_queue_takes_is_counted_and_not_told_again() -> None:
         assert painter.tell(messages.Line("x" * messages.BIGGEST))
         assert painter.too_long == 1
         assert painter.tell(made.plan())
+        assert painter.tell(messages.Line("x" * 300_000)), "more than a socket takes that asks for nothing"
         assert painter.too_long == 1
     finally:
         painter.kill()
