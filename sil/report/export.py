@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from sil.report.whole_file import beside
 from sil.run_columns import COLUMNS
 from sil.runs import Run
 from sil.trouble import UsageError
@@ -28,7 +29,7 @@ def export(run: Run, out: Path | str) -> int:
     if str(out) == STDOUT:
         return _write(run, sys.stdout)
     try:
-        with open(out, "w", encoding="ascii", newline="") as file:
+        with beside(Path(out)) as new, open(new, "w", encoding="ascii", newline="") as file:
             return _write(run, file)
     except OSError as error:
         raise ExportError(f"{out}: cannot write the CSV: {error.strerror or error}") from error

@@ -6,7 +6,6 @@ The root is <testsuite>, which the schemas of Jenkins and Surefire both know. Fa
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterable, Mapping
 from importlib.metadata import version
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 from sil.metrics import judge
+from sil.report.whole_file import beside
 from sil.scenario_metrics import METRICS
 from sil.trouble import EXIT_OK, UsageError
 
@@ -200,11 +200,7 @@ def write(file: Path, text: str) -> None:
         if target.exists() and not target.is_file():
             raise UsageError(f"--junit: expected a file, got {file}")
         target.parent.mkdir(parents=True, exist_ok=True)
-        new = target.with_name(f".{target.name}.{os.getpid()}")
-        try:
+        with beside(target) as new:
             new.write_text(text, encoding="utf-8")
-            new.replace(target)
-        finally:
-            new.unlink(missing_ok=True)
     except OSError as error:
         raise UsageError(f"--junit: cannot write {file}: {error.strerror}") from None

@@ -17,14 +17,22 @@ from sil.trouble import UsageError
 if TYPE_CHECKING:
     from sil.scenario import Scenario
 
+RUN_FILES = ("run.mcap", "timing.mcap", "run.journal", "board.log", "summary.json")
+
 
 class JunitFile:
     """A context around one run; `scenario` is to be set as soon as it is known. file: None for no file at all.
 
     out: the run directory if it was named: it has to be empty for the run, so no file is put into it before.
+    source: the scenario, run directory or log that is read. Raises UsageError where `file` would write over it, or over
+    what the run itself leaves in `out`.
     """
 
-    def __init__(self, file: Path | None, name: str, out: Path | None = None, about: str = "") -> None:
+    def __init__(
+        self, file: Path | None, name: str, out: Path | None = None, about: str = "", source: Path | None = None
+    ) -> None:
+        if file is not None:
+            _spare(file, source, out)
         self.scenario: Scenario | None = None
         self._file = file
         self._name = Path(name).stem
@@ -78,3 +86,19 @@ class JunitFile:
 
         if self._file is not None:
             write(self._file, of_no_run(self._name, self.scenario, message, kind, self._about or THE_RUN))
+
+
+def _spare(file: Path, source: Path | None, out: Path | None) -> None:
+    """Refuse a file that is read, lies in the run that is read, or is one of those a run consists of."""
+    target = file.resolve()
+    if source is not None and source.exists():
+        read = source.resolve()
+        beside = read.suffix == ".mcap" and _is_of_run(target, read.parent)
+        if target == read or beside or (read.is_dir() and target.is_relative_to(read)):
+            raise UsageError(f"--junit: expected a file apart from what is read, got {file}, and {source} is read")
+    if out is not None and _is_of_run(target, out.resolve()):
+        raise UsageError(f"--junit: expected a file of its own, got {file}, which the run writes itself")
+
+
+def _is_of_run(target: Path, folder: Path) -> bool:
+    return target.parent == folder and target.name in RUN_FILES

@@ -98,7 +98,8 @@ def common(a: Run, b: Run) -> tuple[Array, Array]:
 
 def grid(ensemble: Ensemble, signals: Sequence[Signal], residuals: bool) -> Figure:
     """A row for each signal, a column for each axis; with residuals a row more under each."""
-    rows = [(signal, kind) for signal in signals for kind in ((False, True) if residuals else (False,))]
+    apart = [signal for signal in signals if residuals and ensemble.residuals(signal)]  # some may be in one run only
+    rows = [(signal, kind) for signal in signals for kind in ((False, True) if signal in apart else (False,))]
     page = _Page(ensemble, "", _GRID_ROW_in * len(rows), residuals, any(s.name == ATTITUDE for s in signals))
     cells = page.figure.add_gridspec(len(rows), 3, **page.place, hspace=0.2, wspace=0.26)
     above: list[Axes | None] = [None] * 3

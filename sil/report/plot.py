@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from sil.report import overlay, panels
 from sil.report.look import DARK, DPI, LIGHT, Look
 from sil.report.signals import GROUP, Signal, chosen, controlled, identified, signals_of
+from sil.report.whole_file import beside
 from sil.runs import Run
 from sil.trouble import UsageError
 
@@ -86,12 +87,14 @@ def pages(
     shown = chosen(runs, signals, USUAL)
     ensemble = overlay.Ensemble(runs, look)
     one = len(shown) == 1 and not residuals
+    if residuals and not any(ensemble.residuals(signal) for signal in shown):
+        raise PlotError(f"--residuals: expected a signal that {runs[0].path} and another run have, got none")
     made = [Page("overview", overlay.stacked(ensemble, shown[0]) if one else overlay.grid(ensemble, shown, residuals))]
     if not whole:
         return made
     for signal in shown:
         made.append(Page(signal.name, overlay.stacked(ensemble, signal)))
-        if residuals:
+        if residuals and ensemble.residuals(signal):
             made.append(Page(f"{signal.name}-residual", overlay.stacked(ensemble, signal, is_residual=True)))
     return made
 
@@ -126,12 +129,13 @@ def _detail(run: Run, signal: Signal, look: Look) -> Figure:
 
 
 def _write_pdf(out: Path, made: Sequence[Page]) -> Path:
-    with PdfPages(out, metadata={"CreationDate": None}) as document:
+    with beside(out) as new, PdfPages(new, metadata={"CreationDate": None}) as document:
         for page in made:
             document.savefig(page.figure, facecolor=page.figure.get_facecolor())
     return out
 
 
 def _write_png(out: Path, figure: Figure) -> Path:
-    figure.savefig(out, dpi=DPI, facecolor=figure.get_facecolor())
+    with beside(out) as new:
+        figure.savefig(new, format="png", dpi=DPI, facecolor=figure.get_facecolor())
     return out

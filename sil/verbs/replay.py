@@ -50,7 +50,7 @@ def replay(
 
     if board not in REPLAY_BOARDS:
         raise UsageError(f"--board: expected {one_of(REPLAY_BOARDS, board)}, got {board!r}")
-    with JunitFile(junit, str(run_dir), about="replay is identical") as page:
+    with JunitFile(junit, str(run_dir), about="replay is identical", source=run_dir) as page:
         run = opened(run_dir)
         report = replay_run(run, set_ or (), board)
         if junit is not None:

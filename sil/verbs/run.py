@@ -207,7 +207,7 @@ def _run(name: str, load: Callable[[], Scenario], told: Told, wired: bool) -> in
     from sil.runner import run_scenario
     from sil.screen import new_watch, show_summary
 
-    with JunitFile(told.junit, name, told.out) as page:
+    with JunitFile(told.junit, name, told.out, source=Path(name)) as page:
         scenario = page.scenario = load()
         out = told.out or (Path(scenario.out) if scenario.out else None)
         page.leave_empty(out)

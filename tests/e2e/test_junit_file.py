@@ -66,3 +66,21 @@ def test_a_place_that_cannot_be_written_is_said_before_the_run(cli):
     out, err = cli("run", "appc-rs232", "--junit", "folder", code=2)
     assert (out, err) == ("", "--junit: expected a file, got folder\n")
     assert not (cli.folder / "runs").exists()
+
+
+def test_it_does_not_write_over_what_is_read(cli):
+    """A CI file that replaces its own scenario, or the log that it judges, destroys what cannot be made again."""
+    own = cli.folder / "own.yaml"
+    own.write_text("extends: appc-rs232\nduration_s: 5\nclock: lockstep\nlink: inproc\n")
+    before = own.read_bytes()
+    expected = "--junit: expected a file apart from what is read, got {}, and {} is read\n"
+    for spelling in ("own.yaml", "./own.yaml", str(own)):
+        assert cli("run", "own.yaml", "--junit", spelling, code=2)[1] == expected.format(Path(spelling), "own.yaml")
+    assert own.read_bytes() == before
+    cli("run", "own.yaml", "--out", "here", "--junit", "here/summary.json", "-q", code=2)
+    assert not (cli.folder / "here").exists()
+    cli("run", "own.yaml", "--out", "here", "--junit", "here/ci.xml", "-q")
+    kept = {path.name: path.read_bytes() for path in (cli.folder / "here").iterdir()}
+    for source, file in (("here", "here/new.xml"), ("here", "here/run.mcap"), ("here/run.mcap", "here/summary.json")):
+        assert cli("replay", source, "--junit", file, code=2)[1] == expected.format(file, source)
+    assert {path.name: path.read_bytes() for path in (cli.folder / "here").iterdir()} == kept

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "sinks"))
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image
 from synthetic import synthetic_journal
 
@@ -160,6 +162,41 @@ def test_a_signal_of_one_run_only_is_drawn_for_that_one(runs: tuple[Run, Run]) -
     for name in names:
         del runs[1].telemetry[name]
     assert [len(curves) for curves in lines_of(figure)] == [1, 1, 1]
+
+
+def test_what_the_first_run_has_alone_has_no_residual(runs: tuple[Run, Run], tmp_path: Path) -> None:
+    """Such as the error beside a run without a board: no row of differences, and no traceback."""
+    names = [f"g_{axis}" for axis in "xyz"]
+    runs[1].telemetry.update({name: np.linspace(1.0, 2.0, 200) for name in names})
+    try:
+        both = pages(runs, ["g", "rate"], residuals=True)
+        assert [len(curves) for curves in lines_of(both[0].figure)] == [1, 1, 1, 2, 2, 2, 1, 1, 1]
+        assert [page.name for page in both] == ["overview", "g", "rate", "rate-residual"]
+        with pytest.raises(PlotError, match=r"--residuals: expected a signal that .* and another run have, got none"):
+            plot(runs, tmp_path / "a.png", ["g"], residuals=True)
+    finally:
+        for name in names:
+            del runs[1].telemetry[name]
+
+
+@pytest.mark.parametrize("suffix", [".png", ".pdf"])
+def test_a_picture_that_cannot_be_written_leaves_the_older_one(
+    runs: tuple[Run, Run], tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A full disk is met in the middle of writing."""
+    out = tmp_path / f"a{suffix}"
+    out.write_bytes(b"older")
+
+    def full(figure: Figure, file: object, **options: object) -> None:
+        if isinstance(file, Path):
+            file.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Figure, "savefig", full)
+    with pytest.raises(PlotError, match="No space left on device"):
+        plot(runs[:1], out)
+    assert out.read_bytes() == b"older"
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
 
 
 def test_what_cannot_be_compared_is_one_line(runs: tuple[Run, Run], tmp_path: Path) -> None:
