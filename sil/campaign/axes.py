@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
-from sil.scenario_errors import ScenarioInvalid, one_of, shown
+from sil.scenario_errors import one_of, shown
 from sil.scenario_yaml import NUMBER_FLOAT, NUMBER_INT, read_value
 from sil.trouble import UsageError
 
@@ -51,6 +51,7 @@ def parse_axis(key: str, spec: Any, held: Any, where: str) -> Axis:
         values = spec if isinstance(spec, tuple | list) else (spec,)
         return Axis(key, shown(spec), _listed(tuple(values), where, shown(spec)))
     text = spec.strip()
+    refuse_unwritable(text, where)
     if (call := _CALL.fullmatch(text)) is not None:
         return Axis(key, text, (), _distribution(call[1], _items(call[2], where), held, where, text))
     parts = [part.strip() for part in text.split(":")]
@@ -62,9 +63,30 @@ def parse_axis(key: str, spec: Any, held: Any, where: str) -> Axis:
 # -- listed -----------------------------------------------------------------------------------------------------------
 
 
+def refuse_unwritable(value: Any, where: str) -> None:
+    """UsageError for what no plan can hold: NaN, infinity, and text that is none (half a surrogate pair)."""
+    if isinstance(value, float) and not math.isfinite(value):
+        raise UsageError(f"{where}: expected finite numbers, got {value}")
+    if isinstance(value, str) and not _is_text(value):
+        raise UsageError(f"{where}: expected text that UTF-8 can hold, got {value!r}")
+    items = [*value.keys(), *value.values()] if isinstance(value, dict) else value
+    if isinstance(items, tuple | list):
+        for item in items:
+            refuse_unwritable(item, where)
+
+
+def _is_text(text: str) -> bool:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
 def _listed(values: tuple[Any, ...], where: str, text: str) -> tuple[Any, ...]:
     if not values:
         raise UsageError(f"{where}: expected {SPECS}, got {text or 'nothing'}")
+    refuse_unwritable(values, where)
     if len({json.dumps(value) for value in values}) < len(values):
         raise UsageError(f"{where}: expected each value once, got {text}")
     return values
@@ -74,7 +96,7 @@ def _items(text: str, where: str) -> tuple[Any, ...]:
     """`a, [1, 2], "x:y"` as YAML reads it inside of a list."""
     try:
         items = read_value(f"[{text}]", where)
-    except ScenarioInvalid:
+    except ValueError:  # ScenarioInvalid, too; or a number of thousands of digits
         items = None
     if not isinstance(items, tuple):
         raise UsageError(f"{where}: expected {SPECS}, got {text}")
@@ -84,6 +106,7 @@ def _items(text: str, where: str) -> tuple[Any, ...]:
 def _range(parts: Sequence[str], held: Any, where: str, text: str) -> tuple[Any, ...]:
     whole_ends = all(NUMBER_INT.fullmatch(part) for part in parts[:2])
     low, high = (float(part) for part in parts[:2])
+    refuse_unwritable([low, high, high - low], where)
     if len(parts) == 2:
         if not whole_ends or high < low:
             raise UsageError(f"{where}: expected a:b:n (n points), or whole numbers a <= b for a:b, got {text}")
@@ -119,12 +142,20 @@ def _bounded(count: int, where: str) -> int:
 def _distribution(name: str, arguments: tuple[Any, ...], held: Any, where: str, text: str) -> Callable[[float], Any]:
     if name not in DISTRIBUTIONS:
         raise UsageError(f"{where}: expected {one_of(DISTRIBUTIONS, name)}, got {text} (a text is written in quotes)")
+    refuse_unwritable(arguments, where)
     if name != "choice":
         numbers = [value for value in arguments if isinstance(value, int | float) and not isinstance(value, bool)]
         if len(arguments) != 2 or len(numbers) != 2 or not all(map(math.isfinite, numbers)):
             raise UsageError(f"{where}: expected {name}(a,b) with two numbers, got {text}")
     try:
-        return DISTRIBUTIONS[name](arguments, _holds_whole(held))
+        draw = DISTRIBUTIONS[name](arguments, _holds_whole(held))
+        for end in (0.0, 1.0 - 2.0**-53):
+            refuse_unwritable(draw(end), where)
+        return draw
+    except OverflowError:
+        raise UsageError(f"{where}: expected {name}(a,b) of finite numbers, got {text}") from None
+    except UsageError:
+        raise
     except ValueError as error:
         raise UsageError(f"{where}: expected {error}, got {text}") from None
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sil.campaign.axes import refuse_unwritable
 from sil.scenario_errors import one_of, shown
 from sil.scenario_yaml import Values, read_mapping
 from sil.trouble import UsageError
@@ -81,6 +82,8 @@ def _read(file: Path) -> Conditions:
         if key not in KEYS:
             raise UsageError(f"{_at(values, key)}: unknown key; expected {one_of(KEYS, key)}")
     vary, fixed = _section(values, "vary"), _section(values, "set")
+    for key, value in fixed.items():
+        refuse_unwritable(value, _at(values, "set", key))
     return Conditions(
         tuple(Spec(key, spec, _at(values, "vary", key)) for key, spec in vary.items()),
         tuple(f"{key}={json.dumps(value)}" for key, value in fixed.items()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from sil.campaign.plan import Plan
-from sil.campaign.records import Record
+from sil.campaign.records import FLOWN, Record
 from sil.trouble import EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT
 
 
@@ -42,18 +43,43 @@ def exit_code(records: Iterable[Record]) -> int:
 
 
 def _figures(records: Sequence[Record]) -> dict[str, Any]:
+    """measured: points whose run came to its end (exit code 0 or 1); the metrics are over these. diverged: of these."""
+    measured = [record for record in records if record.exit_code in FLOWN]
     names = dict.fromkeys(name for record in records for name in record.metrics)
     return {
         "verdicts": dict(sorted(Counter(record.verdict for record in records).items())),
-        "metrics": {name: _statistics(name, records) for name in names},
+        "measured": len(measured),
+        "excluded": len(records) - len(measured),
+        "diverged": sum(record.metrics.get("diverged_at_s") is not None for record in measured),
+        "metrics": {name: _statistics(name, measured) for name in names},
     }
 
 
 def _statistics(name: str, records: Sequence[Record]) -> dict[str, Any]:
-    """count: points that have a number there; the other figures are over these."""
+    """count: points that have something there, the other figures are over these; never: how many of them are infinite,
+    which is more than any number. A figure that is itself infinite is None."""
     having = [(value, record.point) for record in records if (value := record.metrics.get(name)) is not None]
     if not having:
-        return {"count": 0, "median": None, "p95": None, "max": None, "max_at_point": None}
-    median, p95 = np.percentile(np.array([value for value, _ in having], float), [50.0, 95.0])
+        return {"count": 0, "never": 0, "median": None, "p95": None, "max": None, "max_at_point": None}
+    median, p95 = _percentiles([value for value, _ in having], (50.0, 95.0))
     largest, point = max(having, key=lambda pair: (pair[0], -pair[1]))
-    return {"count": len(having), "median": float(median), "p95": float(p95), "max": largest, "max_at_point": point}
+    figures = {"median": median, "p95": p95, "max": largest}
+    return {
+        "count": len(having),
+        "never": sum(math.isinf(value) for value, _ in having),
+        **{key: None if math.isinf(value) else value for key, value in figures.items()},
+        "max_at_point": point,
+    }
+
+
+def _percentiles(values: Sequence[float], percents: Sequence[float]) -> list[float]:
+    """Between two neighbours in proportion; infinite where the upper one is."""
+    array = np.array(values, float)
+    if np.isfinite(array).all():
+        return [float(value) for value in np.percentile(array, percents)]
+    found = []
+    for percent in percents:
+        lower, upper = (float(np.percentile(array, percent, method=method)) for method in ("lower", "higher"))
+        between = lower != upper and math.isfinite(upper)
+        found.append(float(np.percentile(array, percent)) if between else upper)
+    return found

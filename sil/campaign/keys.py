@@ -9,6 +9,11 @@ from sil.scenario_errors import Path
 from sil.scenario_source import SHORT
 from sil.trouble import UsageError
 
+HOW = {  # is flown, not what: no axis
+    "out": "--out says where a sweep goes",
+    "clock": "--clock says it for all points",
+    "timing": "the scenario says it for all points",
+}
 INERTIA: Path = ("plant", "inertia_kgm2")
 
 
@@ -19,12 +24,15 @@ def canonical_key(key: str, scenario: dict[str, Any], where: str) -> str:
     """
     if not key or not all(key.split(".")):
         raise UsageError(f"{where}: expected KEY=SPEC, such as law.params.c2_pole=0.5:0.9:9, got {key!r}")
+    for part in key.split("."):
+        if part.isdigit() and not part.isascii():
+            raise UsageError(f"{where}: expected an item as 0, 1, 2, got {part!r} in {key}")
     path = path_of(key)
     for short, name in SHORT.items():
         if path[: len(short)] == short and len(path) > len(short) and isinstance(path[len(short)], int):
             path = (*short, name, *path[len(short) :])  # plant.disturbance_Nm.0
-    if path[0] == "out":
-        raise UsageError(f"{where}: expected a key of the test itself, got out; --out says where a sweep goes")
+    if path[0] in HOW:
+        raise UsageError(f"{where}: expected a key of the test itself, got {key}; {HOW[path[0]]}")
     if path[:2] == INERTIA and len(path) == 3 and isinstance(held_at(scenario, path), list):
         row = path[2]
         expected = f"plant.inertia_kgm2.{row}.{row}, since the scenario's inertia has products (3 rows)"
@@ -54,7 +62,7 @@ def variable_values(resolved: dict[str, Any]) -> dict[str, Any]:
 
 def path_of(key: str) -> Path:
     """a.b.0 as ("a", "b", 0)"""
-    return tuple(int(part) if part.isdigit() else part for part in key.split("."))
+    return tuple(int(part) if part.isascii() and part.isdecimal() else part for part in key.split("."))
 
 
 def held_at(scenario: Any, path: Path) -> Any:

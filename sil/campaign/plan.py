@@ -74,8 +74,10 @@ class Plan:
             "sample": self.sample,
             "scenario": self.scenario,
         }
-        points = ",\n".join(f"    {json.dumps(_entry(point))}" for point in self.points)
-        return json.dumps(head, indent=2).removesuffix("\n}") + f',\n  "points": [\n{points}\n  ]\n}}\n'
+        points = ",\n".join(f"    {json.dumps(_entry(point), allow_nan=False)}" for point in self.points)
+        return (
+            json.dumps(head, indent=2, allow_nan=False).removesuffix("\n}") + f',\n  "points": [\n{points}\n  ]\n}}\n'
+        )
 
 
 def make_plan(scenario: Scenario, conditions: Conditions, planning: Planning = lambda done, of: None) -> Plan:

@@ -19,6 +19,7 @@ from sil.campaign.records import Record, broken
 from sil.trouble import LinkFailure
 
 STOP_S = 5.0
+READY = b'{"ready": true}'
 Order = dict[str, Any]  # point, sets, folder, keep
 
 
@@ -49,11 +50,21 @@ class Worker:
         self.order = order
         self._send(order)
 
-    def lines(self) -> list[dict[str, Any]] | None:
-        """What it said since, whole lines; None when it is gone."""
+    def records(self) -> list[Record] | None:
+        """Records that came since, of the point it is at; None when it is gone. Raises ValueError for anything else."""
         data = os.read(self.stdout.fileno(), 1 << 20)
         *whole, self._rest = (self._rest + data).split(b"\n")
-        return [json.loads(line) for line in whole] if data else None
+        found = []
+        for line in whole:
+            if line == READY:
+                self.ready = True
+                continue
+            record = Record.read(line)
+            if self.order is None or record.point != self.order["point"]:
+                raise ValueError(f"expected a record of the point it was given, got one of point {record.point}")
+            self.order = None
+            found.append(record)
+        return found if data else None
 
     def end(self) -> str:
         """Wait for a process that closed its output; returns how it ended."""
@@ -85,6 +96,7 @@ class Pool:
         self._selector = selectors.DefaultSelector()
         self._workers: list[Worker] = []
         self._count = count
+        self._began = False  # one of them, once
 
     def __enter__(self) -> Pool:
         return self
@@ -109,19 +121,20 @@ class Pool:
         return [worker.order for worker in self._workers if worker.order is not None]
 
     def poll(self, timeout_s: float) -> Iterator[Record]:
-        """Records that came within `timeout_s`. Raises LinkFailure when a worker cannot even start."""
+        """Records that came within `timeout_s`. Raises LinkFailure when a worker ends and none could ever begin."""
         for key, _ in self._selector.select(timeout_s):
             worker: Worker = key.data
-            lines = worker.lines()
-            if lines is None:
-                yield from self._gone(worker)
+            try:
+                records = worker.records()
+            except ValueError as error:
+                worker.process.kill()
+                yield from self._gone(worker, f"the worker process was stopped, since it said what is none: {error}")
                 continue
-            for line in lines:
-                if "ready" in line:
-                    worker.ready = True
-                    continue
-                worker.order = None
-                yield Record(**line)
+            self._began = self._began or worker.ready
+            if records is None:
+                yield from self._gone(worker)
+            else:
+                yield from records
 
     def close(self) -> None:
         """End all: idle ones because nothing more comes, busy ones at their next tick; nobody is left behind."""
@@ -141,14 +154,14 @@ class Pool:
         self._selector.close()
         self._log.close()
 
-    def _gone(self, worker: Worker) -> Iterator[Record]:
+    def _gone(self, worker: Worker, why: str = "") -> Iterator[Record]:
         self._selector.unregister(worker.stdout)
         self._workers.remove(worker)
         how = worker.end()
-        if not worker.ready:
+        if not self._began:
             raise LinkFailure(f"sweep: a worker process ended with {how} before it began; see {self._log_file}")
         if worker.order is not None:
-            yield broken(int(worker.order["point"]), f"the worker process ended with {how}")
+            yield broken(int(worker.order["point"]), why or f"the worker process ended with {how}")
 
 
 def _closed(pipe: IO[bytes]) -> None:

@@ -78,7 +78,9 @@ class Terminal(SweepWatch):
             TextColumn("{task.fields[left]}", style="cyan"),
             TextColumn("{task.fields[bad]}", style="red"),
         )
+        from rich.markup import escape
+
         console = Console(stderr=True)
         self._bar = Progress(*columns, console=console, transient=True, auto_refresh=False)
-        self._task = self._bar.add_task(self._name, total=self._points, bad="", left=self._left())
+        self._task = self._bar.add_task(escape(self._name), total=self._points, bad="", left=self._left())
         self._bar.start()

@@ -32,18 +32,19 @@ class Record(NamedTuple):
     def line(self) -> str:
         """One line of results.jsonl; an infinite metric is the text inf there."""
         metrics = {name: "inf" if value == math.inf else value for name, value in self.metrics.items()}
-        return json.dumps(self._replace(metrics=metrics)._asdict(), allow_nan=False) + "\n"
+        return json.dumps({**self._asdict(), "metrics": metrics}, allow_nan=False) + "\n"
 
     @classmethod
     def read(cls, line: bytes) -> Record:
         """What line() wrote; raises ValueError for anything else."""
         try:
-            record = cls(**json.loads(line))
-            metrics = {name: math.inf if value == "inf" else value for name, value in record.metrics.items()}
+            content: dict[str, Any] = json.loads(line)
+            record = cls(**content)
+            metrics = {name: math.inf if value == "inf" else value for name, value in content["metrics"].items()}
             numbers = all(value is None or isinstance(value, int | float) for value in metrics.values())
             if not numbers or not isinstance(record.point, int) or not isinstance(record.exit_code, int):
                 raise TypeError("not the types of a record")
-        except (ValueError, TypeError, AttributeError, RecursionError) as error:
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
             raise ValueError(f"expected a record, got {line[:60]!r}") from error
         return record._replace(metrics={name: value for name, value in metrics.items() if name not in HOST})
 

@@ -17,19 +17,27 @@ import fcntl
 import hashlib
 import io
 import json
+import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 from sil.campaign.figures import summarise
 from sil.campaign.plan import Plan, read_plan
-from sil.campaign.records import Record
+from sil.campaign.records import HOST, Record
 from sil.scenario_metrics import METRICS
-from sil.trouble import EXIT_LINK, UsageError
+from sil.trouble import EXIT_LINK, SilError, UsageError
 
 PLAN, LINES, RUNS, LOG = "plan.json", "results.jsonl", "runs", "workers.log"
 CSV, JSON, SUMMARY = "results.csv", "results.json", "summary.json"
+
+
+class NotRecorded(SilError):
+    """A full disk or the like: what was flown could not be written. What was written before stays."""
+
+    exit_code = EXIT_LINK
 
 
 class Results:
@@ -43,9 +51,9 @@ class Results:
 
     def add(self, record: Record) -> None:
         """One more point is finished: its line reaches the kernel before this returns."""
+        with _recording(self.directory / LINES):
+            _append(self._file, record.line().encode())
         self.records[record.point] = record
-        self._file.write(record.line().encode())
-        self._file.flush()
 
     def forget_failed(self) -> int:
         """Points that failed for link, board or worker count as not run; returns how many."""
@@ -56,8 +64,8 @@ class Results:
 
     def finish(self) -> dict[str, Any]:
         """Write the tables of what is finished; returns the summary, which is in summary.json too."""
-        self._file.flush()
-        os.fsync(self._file.fileno())
+        with _recording(self.directory / LINES):
+            os.fsync(self._file.fileno())
         ordered = [self.records[number] for number in sorted(self.records)]
         summary = summarise(self.plan, ordered)
         _replace(self.directory / CSV, _csv(self.plan, ordered))
@@ -74,10 +82,10 @@ def create(directory: Path, plan: Plan) -> Results:
     """Write the plan, synced to the disk, and begin results.jsonl."""
     text = plan.text()
     _synced(directory / PLAN, text)
-    file = _locked(directory)
-    file.write(_header(text))
-    file.flush()
-    os.fsync(file.fileno())
+    file = _locked(directory / LINES)
+    with _recording(directory / LINES):
+        _append(file, _header(text))
+        os.fsync(file.fileno())
     _sync_directory(directory)
     return Results(directory, plan, file)
 
@@ -93,17 +101,20 @@ def reopen(directory: Path) -> Results:
         reason = getattr(error, "strerror", None) or error
         raise UsageError(f"--resume: expected the directory of a sweep, got {directory}: {PLAN}: {reason}") from None
     plan = read_plan(text, str(directory / PLAN))
-    file = _locked(directory)
+    file = _locked(directory / LINES)
     results = Results(directory, plan, file)
     try:
-        _read_lines(results, file, _header(text))
+        good = _read_lines(results, file, _header(text))
+        if good is not None:
+            results._file = _replaced(file, directory / LINES, good)
     except BaseException:
         file.close()
         raise
     return results
 
 
-def _read_lines(results: Results, file: IO[bytes], header: bytes) -> None:
+def _read_lines(results: Results, file: IO[bytes], header: bytes) -> bytes | None:
+    """Fill in the records; returns what the file should be where it is not, without its damaged lines."""
     file.seek(0)
     lines = file.read().splitlines(keepends=True)
     if lines and lines[0].endswith(b"\n") and lines[0] != header:
@@ -118,20 +129,49 @@ def _read_lines(results: Results, file: IO[bytes], header: bytes) -> None:
         else:
             results.records[record.point] = record
             good.append(line)
-    if b"".join(good) != b"".join(lines):
-        file.seek(0)
-        file.truncate()
-        file.write(b"".join(good))
-        file.flush()
+    return b"".join(good) if good != lines else None
+
+
+def _replaced(file: IO[bytes], path: Path, content: bytes) -> IO[bytes]:
+    """Another file in the place of `file`, synced and locked before it gets there: all of the old one, or of it."""
+    fresh = path.with_suffix(path.suffix + ".new")
+    fresh.unlink(missing_ok=True)
+    other = _locked(fresh)
+    try:
+        with _recording(fresh):
+            _append(other, content)
+            os.fsync(other.fileno())
+        fresh.replace(path)
+    except BaseException:
+        other.close()
+        fresh.unlink(missing_ok=True)
+        raise
+    _sync_directory(path.parent)
+    file.close()
+    return other
+
+
+def _append(file: IO[bytes], content: bytes) -> None:
+    """To the kernel; nothing is left in a buffer, so that a close() after an error has nothing to write."""
+    left = memoryview(content)
+    while left:
+        left = left[file.write(left) :]
+
+
+@contextmanager
+def _recording(file: Path) -> Iterator[None]:
+    """An error of the disk, with the file's name."""
+    try:
+        yield
+    except OSError as error:
+        raise NotRecorded(f"{file}: results could not be recorded: {error.strerror or error}") from None
 
 
 def _record(line: bytes) -> Record | None:
     """None for a line that is not whole."""
-    if not line.endswith(b"\n"):
-        return None
     try:
-        return Record(**json.loads(line))
-    except (ValueError, TypeError):
+        return Record.read(line) if line.endswith(b"\n") else None
+    except ValueError:
         return None
 
 
@@ -139,14 +179,16 @@ def _header(plan_text: str) -> bytes:
     return json.dumps({"plan_sha256": hashlib.sha256(plan_text.encode()).hexdigest()}).encode() + b"\n"
 
 
-def _locked(directory: Path) -> IO[bytes]:
-    file = open(directory / LINES, "a+b")  # noqa: SIM115
+def _locked(path: Path) -> IO[bytes]:
+    file = open(path, "a+b", buffering=0)  # noqa: SIM115
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        if os.path.samestat(os.fstat(file.fileno()), path.stat()):  # not one that was replaced while we opened it
+            return file
     except OSError:
-        file.close()
-        raise UsageError(f"{directory}: expected a sweep that nobody runs, got one that runs at this moment") from None
-    return file
+        pass
+    file.close()
+    raise UsageError(f"{path.parent}: expected a sweep that nobody runs, got one that runs at this moment")
 
 
 # -- tables -----------------------------------------------------------------------------------------------------------
@@ -154,7 +196,8 @@ def _locked(directory: Path) -> IO[bytes]:
 
 def metric_columns(records: Sequence[Record]) -> list[str]:
     """All metrics in a fixed order, known ones first."""
-    known = [f"{name}.{part}" if part else name for name, parts in METRICS.items() for part in parts or ("",)]
+    names = {name: parts for name, parts in METRICS.items() if name not in HOST}
+    known = [f"{name}.{part}" if part else name for name, parts in names.items() for part in parts or ("",)]
     others = {name for record in records for name in record.metrics} - set(known)
     return [*known, *sorted(others)]
 
@@ -181,9 +224,11 @@ def _csv(plan: Plan, records: Sequence[Record]) -> str:
 
 
 def _cell(value: Any) -> str:
-    """Texts bare, nothing for nothing, else as JSON writes it: numbers with all their digits."""
+    """Texts bare, nothing for nothing, inf for never, else as JSON writes it: numbers with all their digits."""
     if value is None:
         return ""
+    if value == math.inf:
+        return "inf"
     return value if isinstance(value, str) else json.dumps(value)
 
 
@@ -194,13 +239,16 @@ def _json(plan: Plan, records: Sequence[Record]) -> str:
 
 
 def _row(plan: Plan, record: Record) -> Mapping[str, Any]:
+    """JSON has no infinity: null, and the name of the metric in `never`."""
+    never = [name for name, value in record.metrics.items() if value == math.inf]
     return {
         "point": record.point,
         "values": plan.points[record.point - 1].values,
         "verdict": record.verdict,
         "exit_code": record.exit_code,
         "reason": record.reason,
-        "metrics": record.metrics,
+        "metrics": {name: None if name in never else value for name, value in record.metrics.items()},
+        "never": never,
         "sha256": record.sha256,
     }
 
@@ -212,11 +260,12 @@ def _replace(file: Path, text: str) -> None:
     """The whole new content or the whole old one, never half of it."""
     fresh = file.with_suffix(file.suffix + ".new")
     _synced(fresh, text)
-    fresh.replace(file)
+    with _recording(file):
+        fresh.replace(file)
 
 
 def _synced(file: Path, text: str) -> None:
-    with open(file, "w", encoding="utf-8", newline="") as out:
+    with _recording(file), open(file, "w", encoding="utf-8", newline="") as out:
         out.write(text)
         out.flush()
         os.fsync(out.fileno())

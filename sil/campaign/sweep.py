@@ -6,6 +6,7 @@ sweep was interrupted.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import time
@@ -17,15 +18,16 @@ from sil.campaign import provenance, results
 from sil.campaign.conditions import Conditions
 from sil.campaign.plan import Point, make_plan, sets_of
 from sil.campaign.pool import Order, Pool
-from sil.campaign.records import Record, refused
+from sil.campaign.records import FLOWN, Record, refused
 from sil.campaign.results import RUNS, Results
 from sil.runner import new_run_dir, next_run_dir
 from sil.scenario import Scenario, load_values
 from sil.stopping import StopRequests
-from sil.trouble import EXIT_INTERRUPTED, UsageError
+from sil.trouble import EXIT_INTERRUPTED, SilError, UsageError
 
 POLL_S = 0.1
 MOST_WORKERS = 256
+UNFINISHED = ".new"  # ending of the directory of a run that is under way
 
 
 class SweepWatch:
@@ -87,17 +89,22 @@ def fly(
     began = time.monotonic()
     waiting = _chosen(opened, again) if again else [p for p in opened.plan.points if p.number not in opened.records]
     count = min(workers or default_workers(opened.plan.scenario), max(1, len(waiting)))
-    _clear(opened.directory, waiting)
+    _clear(opened.directory)
     watch.begin(opened.plan.name, len(waiting), count)
     interrupted = False
     try:
         with StopRequests() as stop:
             stop.hold()
-            interrupted = _fly(opened, waiting, count, keep, watch, stop)
+            try:
+                interrupted = _fly(opened, waiting, count, keep, watch, stop)
+            except Exception:
+                with contextlib.suppress(SilError):  # what stopped the sweep is what is told
+                    opened.finish()
+                raise
             summary = opened.finish()
     finally:
         watch.end()
-        _clear(opened.directory, [point for point in waiting if point.number not in opened.records])
+        _clear(opened.directory)
         opened.close()
     if interrupted:
         summary["exit_code"] = EXIT_INTERRUPTED
@@ -136,6 +143,7 @@ def _fly(
             if following is None and not pool.busy():
                 return False
             for record in pool.poll(POLL_S):
+                _put_in_place(opened.directory, record)
                 opened.add(record)
                 watch.record(record)
             watch.wait()
@@ -156,18 +164,27 @@ def checked_workers(workers: int | None) -> int | None:
 
 
 def _order(point: Point, directory: Path, keep: str) -> Order:
-    folder = _folder(directory, point)
+    folder = _folder(directory, point.number).with_suffix(UNFINISHED)
     return {"point": point.number, "sets": sets_of(point.values), "folder": str(folder.absolute()), "keep": keep}
 
 
-def _folder(directory: Path, point: Point) -> Path:
-    return directory / RUNS / f"{point.number:04d}"
+def _folder(directory: Path, number: int) -> Path:
+    return directory / RUNS / f"{number:04d}"
 
 
-def _clear(directory: Path, points: Sequence[Point]) -> None:
+def _put_in_place(directory: Path, record: Record) -> None:
+    """The run of a finished point takes the place of the one that was kept before; one that broke takes none."""
+    folder = _folder(directory, record.point)
+    if record.run_dir or record.exit_code in FLOWN:
+        shutil.rmtree(folder, ignore_errors=True)
+    if record.run_dir:
+        folder.with_suffix(UNFINISHED).replace(folder)
+
+
+def _clear(directory: Path) -> None:
     """Nothing is left of runs that did not finish."""
-    for point in points:
-        shutil.rmtree(_folder(directory, point), ignore_errors=True)
     runs = directory / RUNS
+    for folder in runs.glob(f"*{UNFINISHED}"):
+        shutil.rmtree(folder, ignore_errors=True)
     if runs.is_dir() and not any(runs.iterdir()):
         runs.rmdir()

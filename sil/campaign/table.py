@@ -28,6 +28,7 @@ METRICS = (  # key, label, unit, scale
     ("rms_torque_Nm.max", "rms torque", "mN m", 1e3),
     ("peak_torque_Nm.max", "peak torque", "mN m", 1e3),
     ("peak_momentum_Nms.max", "peak wheel momentum", "N m s", 1.0),
+    ("settling_s.max", "settled after", "s", 1.0),
     ("diverged_at_s", "diverged at", "s", 1.0),
     ("missed", "commands missed", "", 1.0),
 )
@@ -39,7 +40,7 @@ def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], cons
     _headline(console, summary, plan)
     if records:
         _tables(console, summary, plan, records)
-    console.print(f"sweep: {summary['sweep_dir']}", soft_wrap=True)
+    console.print(f"sweep: {escape(str(summary['sweep_dir']))}", soft_wrap=True)
     console.print("[dim]results.csv, results.json: every point; summary.json: every metric[/]", soft_wrap=True)
 
 
@@ -57,10 +58,19 @@ def _tables(console: Console, summary: Mapping[str, Any], plan: Plan, records: S
     else:
         console.print(_metrics(summary["metrics"], plan.scenario["board"] != "none"))
         caption = "worst axis of each run"
-    console.print(f"[dim]{caption}[/]\n")
+    console.print(f"[dim]{caption}{_left_out(summary)}[/]\n")
     _reasons(console, records)
     if seed_is_idle(plan, records):
         console.print("[yellow]note[/]  the seed changes nothing here: no noise in this scenario", soft_wrap=True)
+
+
+def _left_out(summary: Mapping[str, Any]) -> str:
+    """What the statistics are over, where that is not every run to its full length."""
+    text = f"; over {summary['measured']} points" if summary["excluded"] else ""
+    text += f", without {summary['excluded']} that did not end as planned" if summary["excluded"] else ""
+    never = summary["metrics"].get("settling_s.max", {}).get("never")
+    text += f"; {summary['diverged']} diverged" if summary["diverged"] else ""
+    return text + (f"; {never} never settled" if never else "")
 
 
 def seed_is_idle(plan: Plan, records: Sequence[Record]) -> bool:
@@ -112,7 +122,9 @@ def _metrics(metrics: Mapping[str, Any], errors: bool) -> Table:
             continue
         if key == "missed" and not figures["max"]:
             continue
-        numbers = _numbers([figures[name] for name in ("median", "p95", "max")], scale)
+        never = math.inf if figures["never"] else None
+        found = [never if figures[name] is None else figures[name] for name in ("median", "p95", "max")]
+        numbers = _numbers(found, scale)
         table.add_row(label, *numbers, unit, str(figures["max_at_point"]))
     return table
 
@@ -186,6 +198,7 @@ def _value(value: Any) -> str:
 
 def _numbers(values: Sequence[float | None], scale: float = 1.0) -> list[str]:
     """With the same number of decimals, so that they can be compared: four digits of the largest."""
-    largest = max((abs(value) * scale for value in values if value is not None), default=0.0)
+    finite = [value for value in values if value is not None and math.isfinite(value)]
+    largest = max((abs(value) * scale for value in finite), default=0.0)
     decimals = min(9, max(0, 3 - math.floor(math.log10(largest)))) if 0 < largest < math.inf else 0
-    return ["-" if value is None else f"{value * scale:.{decimals}f}" for value in values]
+    return ["-" if v is None else "never" if v == math.inf else f"{v * scale:.{decimals}f}" for v in values]

@@ -21,10 +21,11 @@ from typing import Any
 from sil.campaign.records import Record, broken, record_of, refused
 from sil.runner import run_scenario
 from sil.scenario import load_values
-from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, SilError
+from sil.sinks.journal import JournalError
+from sil.trouble import EXIT_INTERRUPTED, SilError, UsageError
 
 PR_SET_PDEATHSIG = 1
-KEEP = ("none", "on-fail", "all")
+STOPPED = "KeyboardInterrupt: the law raised it, or somebody told the worker to stop"
 
 
 def main() -> None:
@@ -38,21 +39,25 @@ def main() -> None:
         print(json.dumps({"ready": True}), file=records, flush=True)
         while line := sys.stdin.readline():
             record = fly(setup, json.loads(line))
-            if record.exit_code == EXIT_INTERRUPTED:
-                return
             print(record.line(), end="", file=records, flush=True)
     except (KeyboardInterrupt, BrokenPipeError):
         return  # the sweep is over
 
 
 def fly(setup: dict[str, Any], order: dict[str, Any]) -> Record:
-    """One point, from its values to its record; its run directory is deleted unless it is to be kept."""
+    """One point, from its values to its record; its run directory is deleted unless it is to be kept.
+
+    The order's folder ends with .new; the sweep takes that away once the record has arrived.
+    """
     folder = Path(order["folder"])
     began = time.perf_counter()
     record = _flown(setup, order, folder)._replace(wall_s=round(time.perf_counter() - began, 6))
-    failed = record.exit_code != 0 and record.exit_code != EXIT_INTERRUPTED
-    if folder.exists() and (order["keep"] == "all" or (order["keep"] == "on-fail" and failed)):
-        return record._replace(run_dir=f"{folder.parent.name}/{folder.name}")
+    if folder.exists() and (order["keep"] == "all" or (order["keep"] == "on-fail" and record.exit_code != 0)):
+        try:
+            _say_where(folder, folder.with_suffix(""))
+        except (OSError, ValueError) as error:
+            print(f"{folder}: summary.json says no run_dir that will be: {error}", file=sys.stderr)
+        return record._replace(run_dir=f"{folder.parent.name}/{folder.stem}")
     shutil.rmtree(folder, ignore_errors=True)
     return record
 
@@ -61,13 +66,31 @@ def _flown(setup: dict[str, Any], order: dict[str, Any], folder: Path) -> Record
     point = int(order["point"])
     try:
         scenario = load_values(setup["scenario"], order["sets"], "scenario", Path(setup["directory"]))
-        return record_of(point, run_scenario(scenario, folder), 0.0)
+        summary = run_scenario(scenario, folder)
+        return broken(point, STOPPED) if summary["exit_code"] == EXIT_INTERRUPTED else record_of(point, summary, 0.0)
+    except KeyboardInterrupt:
+        return broken(point, STOPPED)
+    except UsageError as error:
+        return broken(point, f"{error}") if _machine_said_no(error) else refused(point, f"{error}")
     except SilError as error:
-        text = f"{error}"
-        return broken(point, text) if error.exit_code == EXIT_LINK else refused(point, text)
+        return broken(point, f"{error}")
     except Exception as error:  # a bug of a law or of ours: this point's, not the sweep's
         traceback.print_exc()
         return broken(point, f"{type(error).__name__}: {error} (see workers.log)")
+
+
+def _machine_said_no(error: BaseException) -> bool:
+    """Whether a UsageError only tells of a disk that is full or the like: another time the point may fly."""
+    cause = error.__cause__ or error.__context__
+    return cause is not None and (isinstance(cause, OSError | JournalError) or _machine_said_no(cause))
+
+
+def _say_where(folder: Path, final: Path) -> None:
+    """summary.json of a kept run names the directory the run is going to have."""
+    file = folder / "summary.json"
+    if file.exists():
+        summary = json.loads(file.read_text(encoding="utf-8")) | {"run_dir": str(final)}
+        file.write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _die_with(parent: int) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -41,6 +42,7 @@ class Manner(NamedTuple):
     as_json: bool
     quiet: bool
     again: Sequence[int] = ()
+    retry_failed: bool = False
 
 
 def sweep(
@@ -118,7 +120,7 @@ def sweep(
         ),
     ] = None,
     resume: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             "--resume",
             metavar="DIR",
@@ -144,14 +146,14 @@ def sweep(
         ),
     ] = None,
     keep: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--keep",
             metavar="WHICH",
-            help="Run directories to keep: none, on-fail (exit code not 0) or all.",
+            help="Run directories to keep: none (default), on-fail (exit code not 0) or all.",
             rich_help_panel=RESULT_PANEL,
         ),
-    ] = "none",
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -186,11 +188,20 @@ def sweep(
     """
     from sil.campaign.conditions import conditions_from
     from sil.campaign.sweep import checked_workers, new_sweep, old_sweep
+    from sil.stopping import terminated_like_interrupted
 
-    manner = Manner(checked_workers(jobs), keep, as_json, quiet, tuple(again or ()))
-    if keep not in KEEP:
+    if keep is not None and keep not in KEEP:
         raise UsageError(f"--keep: expected one of {', '.join(KEEP)}, got {keep}")
+    if again and (keep is not None or retry_failed):
+        raise UsageError(
+            "--again: expected neither --keep nor --retry-failed beside it, since it keeps its points' runs"
+        )
+    manner = Manner(
+        checked_workers(jobs), "all" if again else keep or "none", as_json, quiet, tuple(again or ()), retry_failed
+    )
     if resume is not None:
+        if not resume:
+            raise UsageError("--resume: expected the directory of a sweep, got an empty text")
         if (
             scenario is not None
             or any((vary, vary_file, draws, sample, set_, clock, link, board, out))
@@ -199,22 +210,31 @@ def sweep(
             raise UsageError(
                 f"--resume: expected neither scenario nor keys beside it: {resume}/plan.json says them all"
             )
-        return _fly(old_sweep(resume, retry_failed), manner._replace(keep="all" if again else keep))
+        with terminated_like_interrupted():
+            return _fly(old_sweep(Path(resume), retry_failed), manner)
     if retry_failed or again:
         raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")
     if scenario is None:
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
-    base = _base(scenario, [*conditions.sets, *(set_ or ())], clock=clock, link=link, board=board)
-    return _fly(new_sweep(base, conditions, out, _watch(manner)), manner)
+    varied = [spec.key for spec in conditions.specs]
+    with terminated_like_interrupted():
+        base = _base(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
+        return _fly(new_sweep(base, conditions, out, _watch(manner)), manner)
 
 
-def _base(name: str, sets: list[str], clock: str | None, link: str | None, board: str | None) -> Scenario:
-    """The scenario in lockstep, and in process, unless it has no board or somebody said how it is to be reached."""
+def _base(
+    name: str, sets: list[str], varied: list[str], clock: str | None, link: str | None, board: str | None
+) -> Scenario:
+    """The scenario in lockstep, and in process, unless it has no board or somebody said how it is to be reached.
+
+    To vary a key of board or link says so too: in process all values would be alike.
+    """
     own = scenario_from(name, sets, clock=clock, link=link, board=board)
+    how = any(key.partition(".")[0] in ("board", "link") for key in varied)
     said = {text.partition("=")[0] for text in sets}
     before = [] if clock is not None or said & {"clock", "clock.mode"} else ["clock.mode=lockstep"]
-    if own.board != "none" and link is None and board is None and not said & {"board", "link", "link.url"}:
+    if own.board != "none" and link is None and board is None and not how and not said & {"board", "link", "link.url"}:
         before.append("board=inproc")
     return scenario_from(name, [*before, *sets], clock=clock, link=link, board=board)
 
@@ -232,7 +252,7 @@ def _fly(opened: Results, manner: Manner) -> int:
 
     if opened.torn:
         print(f"{opened.torn} damaged lines of results.jsonl: their points are flown again", file=sys.stderr)
-    before = {number: opened.records[number].sha256 for number in manner.again if number in opened.records}
+    before = {number: opened.records.get(number) for number in manner.again}
     summary = fly(opened, manner.workers, manner.keep, _watch(manner), manner.again)
     if manner.as_json:
         print_json(summary)
@@ -240,16 +260,26 @@ def _fly(opened: Results, manner: Manner) -> int:
         print(headline(summary))
     else:
         show(summary, opened.plan, [opened.records[number] for number in sorted(opened.records)])
-    for number in manner.again:
-        if (record := opened.records.get(number)) is not None and record.run_dir:
-            other = before.get(number, record.sha256) != record.sha256
+    flown = [number for number, old in before.items() if opened.records.get(number) is not old]
+    for number in flown:
+        record, old = opened.records[number], before[number]
+        if record.run_dir:
+            other = old is not None and old.sha256 != record.sha256
             said = ": not the bytes it had before, on this machine something else decides" if other else ""
             print(f"point {number}: {opened.directory / record.run_dir}{said}", file=sys.stderr)
-    _say_how_to_go_on(summary)
+    if summary["interrupted"]:
+        _say_how_to_go_on(summary, manner, [number for number in before if number not in flown])
     return int(summary["exit_code"])
 
 
-def _say_how_to_go_on(summary: dict[str, Any]) -> None:
-    if summary["interrupted"]:
-        done = f"{summary['finished']} of {summary['points']} points"
-        print(f"interrupted after {done}; go on with: sil sweep --resume {summary['sweep_dir']}", file=sys.stderr)
+def _say_how_to_go_on(summary: dict[str, Any], manner: Manner, left: Sequence[int]) -> None:
+    done = f"{summary['finished']} of {summary['points']} points"
+    options = [f"--again {number}" for number in left]
+    if manner.again:
+        done = f"{len(manner.again) - len(left)} of {len(manner.again)} points"
+    elif manner.keep != "none":
+        options.append(f"--keep {manner.keep}")
+    if manner.retry_failed:
+        options.append("--retry-failed")
+    command = shlex.join(["sil", "sweep", "--resume", str(summary["sweep_dir"])])
+    print(f"interrupted after {done}; go on with: {' '.join([command, *options])}", file=sys.stderr)

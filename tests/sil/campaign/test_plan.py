@@ -83,6 +83,18 @@ def test_a_plan_is_read_back_as_it_was_written():
         (["plant.inertia_kgm2.0=uniform(8,9)"], {"draws": 2}, "1000 in a row"),
         (["plant.inertia_kgm2.0=8,9"], {}, "no point of the sweep can be flown"),
         (["out=a,b"], {}, "--out says where"),
+        (["clock.mode=realtime,lockstep"], {}, "--clock says it for all points"),  # it went past the one-worker rule
+        (["clock=realtime,lockstep"], {}, "--clock says it for all points"),
+        (["timing.max_lateness_ms=1,2"], {}, "the scenario says it for all points"),
+        (["plant.inertia_kgm2.²=1,2"], {}, "an item as 0, 1, 2"),  # a digit to str.isdigit, and to nobody else
+        (["plant.initial.attitude_deg.0=1,.nan"], {}, "expected finite numbers, got nan"),
+        (["plant.initial.attitude_deg.0=1e400"], {}, "expected finite numbers, got inf"),
+        (["plant.initial.attitude_deg.0=1:1e400:3"], {}, "expected finite numbers, got inf"),
+        (["plant.initial.attitude_deg=[0, .inf, 0]"], {}, "expected finite numbers, got inf"),
+        (["plant.initial.attitude_deg.0=choice(1,.inf)"], {"draws": 2}, "expected finite numbers, got inf"),
+        (["plant.initial.attitude_deg.0=normal(0,1e308)"], {"draws": 2}, "expected finite numbers"),
+        (["law.name=mrac,\udc80"], {}, "text that UTF-8 can hold"),
+        (['law.name=mrac,"\\ud800"'], {}, "text that UTF-8 can hold"),
     ],
 )
 def test_what_makes_no_sense_is_refused(vary, options, said):

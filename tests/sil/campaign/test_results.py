@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
+import math
 
 import pytest
 
@@ -98,7 +100,9 @@ def test_figures_are_over_the_points_that_have_them_and_by_cell(plan):
     records.append(broken(6, "gone"))
     summary = summarise(plan, records)
     figures = summary["metrics"]["rms_error_deg.max"]
-    assert figures == {"count": 4, "median": 3.5, "p95": pytest.approx(5.85), "max": 6.0, "max_at_point": 3}
+    assert figures == {
+        "count": 4, "never": 0, "median": 3.5, "p95": pytest.approx(5.85), "max": 6.0, "max_at_point": 3
+    }  # fmt: skip
     assert summary["verdicts"] == {"failed": 1, "passed": 5}
     first, second = summary["cells"]
     assert first["values"] == {"law.params.c2_pole": 0.7} and first["metrics"]["rms_error_deg.max"]["median"] == 2.0
@@ -119,3 +123,93 @@ def test_the_worst_axis_of_a_metric_that_is_not_a_number_is_not_one_either():
     assert flat["rms_error_deg.max"] is None and flat["rms_error_deg.yaw"] == 2.0
     assert flat["peak_torque_Nm.max"] == 3.0 and flat["peak_torque_Nm.y"] == 3.0
     assert flat["missed"] == 4
+
+
+def test_the_worst_axis_is_the_one_a_requirement_has():
+    """settling_s.max of an axis without a step was empty here and 39.5 in `sil run`; never was no step."""
+    assert flat_metrics({"settling_s": [39.5, None, 12.0]})["settling_s.max"] == 39.5
+    assert flat_metrics({"settling_s": [None] * 3, "never_settled": []})["settling_s.max"] is None
+    never = flat_metrics({"settling_s": [39.5, None, None], "never_settled": ["yaw"]})
+    assert (never["settling_s.max"], never["settling_s.pitch"], never["settling_s.yaw"]) == (math.inf, None, math.inf)
+
+
+def test_what_belongs_to_the_link_of_this_host_is_in_no_table(tmp_path, plan):
+    """Bytes of a table must not depend on the cable; lines of older sweeps still have them."""
+    metrics = {"crc_errors": 3, "discarded_bytes": 9, "missed": 1}
+    assert flat_metrics(metrics) == {"missed": 1}
+    opened = results.create(tmp_path, plan)
+    opened.add(passed(1, 0.5)._replace(metrics=metrics))
+    opened.close()
+    again = results.reopen(tmp_path)
+    again.finish()
+    again.close()
+    for name in ("results.csv", "results.json", "summary.json"):
+        text = (tmp_path / name).read_text()
+        assert "crc_errors" not in text and "discarded" not in text and "missed" in text
+
+
+def test_runs_that_died_are_in_no_statistics(plan):
+    """A run that a link ended after a second has a small error for that reason alone."""
+    died = passed(4, 1e-6)._replace(verdict="failed", exit_code=3)
+    diverged = passed(3, 6.0)._replace(
+        verdict="failed", exit_code=1, metrics={"rms_error_deg.max": 6.0, "diverged_at_s": 2.0}
+    )
+    summary = summarise(plan, [passed(1, 1.0), passed(2, 2.0), diverged, died, refused(5, "no")])
+    figures = summary["metrics"]["rms_error_deg.max"]
+    assert (figures["count"], figures["median"], figures["max"]) == (3, 2.0, 6.0)
+    assert (summary["measured"], summary["excluded"], summary["diverged"]) == (3, 2, 1)
+    assert summary["cells"][1]["metrics"].get("rms_error_deg.max", {}).get("count", 0) == 0
+
+
+def test_never_is_more_than_any_time_and_goes_through_every_file(tmp_path, plan):
+    """Never settled must not improve a sweep, nor look like an axis that had no step."""
+    opened = results.create(tmp_path, plan)
+    for number, value in enumerate((10.0, 20.0, math.inf, None, 30.0, math.inf), start=1):
+        opened.add(Record(number, "passed", 0, "", {"settling_s.max": value}, "sha"))
+    opened.close()
+    again = results.reopen(tmp_path)
+    summary = again.finish()
+    again.close()
+    figures = summary["metrics"]["settling_s.max"]
+    assert figures == {"count": 5, "never": 2, "median": 30.0, "p95": None, "max": None, "max_at_point": 3}
+    assert [row["settling_s.max"] for row in rows(tmp_path)] == ["10.0", "20.0", "inf", "", "30.0", "inf"]
+    points = json.loads((tmp_path / "results.json").read_text())["points"]
+    assert [(p["metrics"]["settling_s.max"], p["never"]) for p in points[2:4]] == [
+        (None, ["settling_s.max"]),
+        (None, []),
+    ]
+
+
+def test_a_full_disk_while_damaged_lines_are_dropped_loses_nothing(tmp_path, plan, monkeypatch):
+    """The good lines go into another file first; what could not be recorded names its file and exits with 3."""
+    opened = results.create(tmp_path, plan)
+    opened.add(passed(1, 0.5))
+    opened.close()
+    file = tmp_path / "results.jsonl"
+    with open(file, "a") as out:
+        out.write('{"point": 2, "verd')
+    before = file.read_bytes()
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(results, "_append", full)
+        with pytest.raises(results.NotRecorded, match=r"results.jsonl.new.*No space left") as caught:
+            results.reopen(tmp_path)
+    assert caught.value.exit_code == 3
+    assert file.read_bytes() == before and not file.with_name("results.jsonl.new").exists()
+    again = results.reopen(tmp_path)
+    assert again.records == {1: passed(1, 0.5)}
+    with pytest.raises(UsageError, match="runs at this moment"):  # the new file is locked as the old one was
+        results.reopen(tmp_path)
+    with monkeypatch.context() as patched:
+        patched.setattr(results, "_append", full)
+        with pytest.raises(results.NotRecorded, match=r"results.jsonl: results could not be recorded"):
+            again.add(passed(2, 0.5))
+    assert 2 not in again.records
+    again.close()
+
+
+def test_a_reason_that_no_file_can_hold_is_written_with_escapes():
+    assert broken(1, "law: \udc80\n gone").reason == "law: \\udc80 gone"
