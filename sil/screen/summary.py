@@ -89,7 +89,7 @@ def _lateness(summary: Mapping[str, Any]) -> Iterator[str]:
     if late:
         colour = WARN if summary["verdict"] == "degraded" else DIM
         beyond_ms = timing.get("late_beyond_ms")
-        limit = f"more than {beyond_ms:g} ms" if beyond_ms else "more than a period"
+        limit = f"more than {_duration(beyond_ms * 1e3)}" if beyond_ms else "more than a period"
         causes = _causes(timing, "late_ticks")
         why = f": {causes}" if causes else ": a busy machine or too fast a clock"
         yield f"[{colour}]late ticks[/]: {late} of {summary['ticks']} ticks woke {limit} late{why}"
@@ -140,7 +140,7 @@ def _histogram(histogram: Mapping[str, list[int]] | None) -> Iterator[str]:
 
 def _duration(us: float) -> str:
     for scale, unit in ((1e6, "s"), (1e3, "ms")):
-        if us >= scale:
+        if us >= 0.9995 * scale:  # what three digits show as 1000 is one of the next unit
             return f"{us / scale:.3g} {unit}"
     return f"{us:.3g} us"
 

@@ -22,5 +22,15 @@ def describe(code: int, a: int, b: int) -> tuple[str, str]:
     kind = EVENTS.get(code)
     if kind is None:
         return "warning", f"unknown event code 0x{code:04X} (a {a}, b {b})"
-    numbers = ", ".join(f"{meaning} {value}" for meaning, value in ((kind.a, a), (kind.b, b)) if meaning)
+    numbers = ", ".join(_in_words(meaning, value) for meaning, value in ((kind.a, a), (kind.b, b)) if meaning)
     return level_of(code), f"{kind.name}: {kind.about}" + (f" ({numbers})" if numbers else "")
+
+
+def _in_words(meaning: str, value: int) -> str:
+    """`tick 7`; where the meaning lists choices, as in `why (0 late, 1 early)`, the one that it is: `why: early`."""
+    name, _, choices = meaning.rstrip(")").partition(" (")
+    for choice in choices.split(", "):
+        number, _, text = choice.partition(" ")
+        if number == str(value):
+            return f"{name}: {text}"
+    return f"{meaning} {value}"

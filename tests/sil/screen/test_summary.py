@@ -67,3 +67,12 @@ def test_verbose_has_the_histogram_and_what_was_granted(capsys: pytest.CaptureFi
     assert ["up", "to", "20", "ms", "0"] in lines and ["beyond", "20", "ms", "2", "━"] in lines
     assert "priority: SCHED_FIFO 50" in text and "refused: clock.lock_memory: [refused]" in text
     assert "up to 50 us" not in text
+
+
+@pytest.mark.parametrize(
+    ("us", "text"), [(0.34, "0.34 us"), (999.4, "999 us"), (999.6, "1 ms"), (999_600, "1 s"), (5.03e6, "5.03 s")]
+)
+def test_a_time_in_the_unit_that_suits_it(us: float, text: str) -> None:
+    from sil.screen.summary import _duration
+
+    assert _duration(us) == text
