@@ -6,6 +6,7 @@ scenario; 3 link or board failure, or timing degraded; 1 a requirement failed or
 
 from __future__ import annotations
 
+import errno
 import sys
 from collections.abc import Callable
 from typing import Annotated
@@ -69,6 +70,9 @@ for _panel, _verbs in VERBS.items():
         app.command(rich_help_panel=_panel, help=_page.help, epilog=_page.epilog)(_verb)
 
 
+DISK_FULL = (errno.ENOSPC, errno.EDQUOT)  # no usage error: the same command will do when there is room
+
+
 def main(argv: list[str] | None = None) -> None:
     """Entry point: maps every expected failure to one line on stderr and its exit code."""
     streams.settle()
@@ -108,9 +112,18 @@ def _explained(error: Exception) -> int:
         code = error.exit_code
     elif isinstance(error, LinkError | SealError):
         code = EXIT_LINK
-    elif isinstance(error, ScenarioInvalid | RunError | JournalError | OSError):
+    elif isinstance(error, OSError):
+        print(_reason(error), file=sys.stderr)
+        return EXIT_LINK if error.errno in DISK_FULL else EXIT_USAGE
+    elif isinstance(error, ScenarioInvalid | RunError | JournalError):
         code = EXIT_USAGE
     else:
         raise error
     print(error, file=sys.stderr)
     return code
+
+
+def _reason(error: OSError) -> str:
+    """`FILE: reason`, as far as either is known."""
+    files = " to ".join(str(file) for file in (error.filename, error.filename2) if file is not None)
+    return ": ".join(filter(None, (files, error.strerror or str(error) or type(error).__name__)))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv as csv_module
 import io
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from rich import box
@@ -53,7 +53,7 @@ class Row(NamedTuple):
     """One run. metrics: those of sil.metrics.measure; None where this run has no such thing."""
 
     label: str
-    run: str
+    run: str | None  # its log; None: made for this table only, and gone by now
     scenario: str
     law: str
     seed: Any
@@ -69,11 +69,11 @@ class Row(NamedTuple):
         return {**self._asdict(), "metrics": {**as_json(self.metrics), "settled": settled}}
 
 
-def rows(runs: Sequence[Run], verdicts: Mapping[int, str] | None = None) -> list[Row]:
-    """One for each run; `verdicts` by index are those of runs that were just made."""
+def rows(runs: Sequence[Run], verdicts: Mapping[int, str] | None = None, temporary: Collection[int] = ()) -> list[Row]:
+    """One for each run; `verdicts` by index are those of runs that were just made, `temporary` of those not kept."""
     given = verdicts or {}
     return [
-        _row(run, label, given.get(i) or run.summary.get("verdict"))
+        _row(run, label, given.get(i) or run.summary.get("verdict"), i in temporary)
         for i, (run, label) in enumerate(zip(runs, labels(runs), strict=True))
     ]
 
@@ -128,13 +128,13 @@ def csv(found: Sequence[Row]) -> str:
     return out.getvalue()
 
 
-def _row(run: Run, label: str, verdict: str | None) -> Row:
+def _row(run: Run, label: str, verdict: str | None, temporary: bool) -> Row:
     metrics = measure(run)
     if not controlled(run):
         metrics |= dict.fromkeys(_FOLLOWING)
     return Row(
         label,
-        str(run.path),
+        None if temporary else str(run.path),
         run.name,
         law_of(run),
         run.meta.get("seed"),

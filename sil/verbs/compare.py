@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,10 +20,7 @@ if TYPE_CHECKING:
     from sil.scenario import Scenario
 
 _YAML = (".yaml", ".yml")
-
-
-def _offers(incomplete: str) -> list[tuple[str, str]]:
-    return [*completion.scenarios(incomplete), *completion.runs(incomplete)]
+NOT_KEPT = "-made"  # so that runs/NAME-001 and the NAME-made-001 of this table are told apart by more than a path
 
 
 def compare(
@@ -32,7 +29,7 @@ def compare(
         typer.Argument(
             metavar="RUN_OR_SCENARIO...",
             help="Run directories or .mcap files; names of scenarios or YAML files, which are run first.",
-            autocompletion=_offers,
+            autocompletion=completion.runs_and_scenarios,
         ),
     ],
     set_: SetOption = None,
@@ -67,17 +64,25 @@ def compare(
     if set_ and all(isinstance(source, Run) for source in sources):
         raise UsageError("--set: expected a scenario among the names, got only runs, which are what they are")
     with _folder(keep) as parent:
-        runs, verdicts, code = _collected(sources, parent)
+        runs, verdicts, code = _collected(sources, parent, "" if keep else NOT_KEPT)
         if runs:
-            _print(runs, verdicts, as_json, as_csv)
+            _print(runs, verdicts, () if keep else verdicts, as_json, as_csv)
     return code
 
 
 def _source(name: str, sets: list[str] | None) -> Run | Scenario:
     """A run, or the scenario to make one of. Everything is looked up before anything is run."""
+    from sil.scenario_errors import one_of
+    from sil.scenarios import list_scenarios
+
+    if not name.strip():
+        raise UsageError("compare: expected a run or a scenario, got an empty text")
     path = Path(name)
     if (path.exists() and path.suffix not in _YAML) or path.suffix == ".mcap":
         return opened(path)
+    known = [info.name for info in list_scenarios()]
+    if not path.exists() and name not in known:
+        raise UsageError(f"compare: expected a run directory, a scenario file or {one_of(known, name)}, got {name!r}")
     scenario = scenario_from(name, sets, clock="lockstep", link="inproc")
     if scenario.board == "none":
         return scenario
@@ -93,7 +98,7 @@ def _folder(keep: Path | None) -> Iterator[Path]:
         yield Path(made)
 
 
-def _collected(sources: list[Run | Scenario], parent: Path) -> tuple[list[Run], dict[int, str], int]:
+def _collected(sources: list[Run | Scenario], parent: Path, suffix: str) -> tuple[list[Run], dict[int, str], int]:
     """(runs, verdicts of those made here by index, exit code): ends at the first that is interrupted."""
     from sil.runner import run_scenario
     from sil.runs import Run, open_run
@@ -109,7 +114,7 @@ def _collected(sources: list[Run | Scenario], parent: Path) -> tuple[list[Run], 
                 runs.append(source)
                 continue
             progress.begin(source.name)
-            summary = run_scenario(source, _run_dir(parent, source.name), progress)
+            summary = run_scenario(source, _run_dir(parent, source.name + suffix), progress)
             if summary["exit_code"] == EXIT_INTERRUPTED:
                 return runs, verdicts, EXIT_INTERRUPTED
             if summary["failure"]:
@@ -133,10 +138,10 @@ def _run_dir(parent: Path, name: str) -> Path:
     return parent / f"{name}-{number:03d}"
 
 
-def _print(runs: list[Run], verdicts: dict[int, str], as_json: bool, as_csv: bool) -> None:
+def _print(runs: list[Run], verdicts: dict[int, str], temporary: Collection[int], as_json: bool, as_csv: bool) -> None:
     from sil.report import compare as report
 
-    found = report.rows(runs, verdicts)
+    found = report.rows(runs, verdicts, temporary)
     if as_json:
         print_json({"runs": [row.as_dict() for row in found]})
     elif as_csv:

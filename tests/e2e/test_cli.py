@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import io
 import json
 import os
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from sil.cli import VERBS as PANELS
+from sil.cli import invoke
 
 COLUMNS = [
     *("tick", "t_s", "phi_deg", "theta_deg", "psi_deg", "ref_phi_deg", "ref_theta_deg", "ref_psi_deg"),
@@ -277,3 +279,24 @@ def test_a_busy_udp_port(cli):
         _, err = cli("run", *SHORT, "--link", f"udp://127.0.0.1:{port}", code=3)
     assert str(port) in err
     assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "runs/x-001/summary.json"), 3,
+         "runs/x-001/summary.json: No space left on device"),
+        (OSError(errno.ENOSPC, "No space left on device"), 3, "No space left on device"),
+        (PermissionError(errno.EACCES, "Permission denied", "own.yaml"), 2, "own.yaml: Permission denied"),
+        (OSError("odd"), 2, "odd"),
+    ],
+)  # fmt: skip
+def test_what_the_disk_says_is_told_of_its_file(error, code, said, monkeypatch, capsys):
+    """No `[Errno 28]`; and a full disk is not the user's spelling: exit 3, not 2."""
+
+    def fails(*_arguments, **_options):
+        raise error
+
+    monkeypatch.setattr("sil.scenario.load_scenario", fails)
+    assert invoke(["run", "appc-rs232"]) == code
+    assert capsys.readouterr().err == f"{said}\n"

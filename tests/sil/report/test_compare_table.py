@@ -129,10 +129,42 @@ def test_a_scenario_is_run_first_and_leaves_nothing_behind(
     rows = json.loads(told.out)["runs"]
     assert [row["scenario"] for row in rows] == ["synthetic", "pd-root-locus"]
     assert rows[1]["ticks"] == 10
+    assert [row["run"] for row in rows] == [str(runs[0].path), None]
     assert rows[1]["verdict"] == "failed"
     assert "running pd-root-locus (1 of 1)" in told.err
     assert [path.name for path in tmp_path.iterdir()] == ["tmp"]
     assert not any((tmp_path / "tmp").iterdir())
+
+
+def test_what_is_printed_does_not_depend_on_the_temporary_directory(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where a run of the same scenario has the number that a temporary one would have."""
+    arguments = ["compare", "pd-root-locus", *SHORT]
+    assert cli.invoke([*arguments, "--keep", str(tmp_path)]) == 0
+    mine = [arguments[0], str(tmp_path / "pd-root-locus-001"), *arguments[1:]]
+    capsys.readouterr()
+    for form in ("--json", "--csv"):
+        told = []
+        for _ in range(2):
+            assert cli.invoke([*mine, form]) == 0
+            told.append(capsys.readouterr().out)
+        assert told[0] == told[1]
+        assert "sil-compare-" not in told[0]
+    assert list(csv.DictReader(io.StringIO(told[0])))[1]["run"] == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("runs/nowhere", "compare: expected a run directory, a scenario file or one of appc-rs232, "),
+        ("mrac-rs323", "(did you mean mrac-rs232?), got 'mrac-rs323'"),
+        ("", "compare: expected a run or a scenario, got an empty text"),
+    ],
+)
+def test_what_is_neither_run_nor_scenario(name: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.invoke(["compare", name]) == 2
+    assert said in capsys.readouterr().err
 
 
 def test_runs_are_kept_where_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
