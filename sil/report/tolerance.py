@@ -119,7 +119,9 @@ def close(a: Run, b: Run, allowed: Mapping[str, float | None] = DEFAULTS) -> Clo
 def text(found: Closeness) -> str:
     """The same for reading."""
     same = "CONFIG, frames and their fates, flags, counters and events are the same"
-    lines = [f"{'within' if found.within else 'BEYOND'} tolerances: {found.ticks[0]} ticks, {found.frames} frames"]
+    unjudged = any(each.largest and each.tolerance is None for each in found.departures)
+    verdict = f"{'within' if found.within else 'BEYOND'} tolerances: {found.ticks[0]} ticks, {found.frames} frames"
+    lines = [verdict + ("; TELEMETRY departs and is not judged" if unjudged else "")]
     lines += [f"differs: {line}" for line in found.unequal] or [same]
     if not any(line.startswith(("frames", "period")) for line in found.unequal):
         lines.append(_bytes_line(found))
@@ -211,9 +213,8 @@ def _counters(a: Run, b: Run) -> Iterator[str]:
 
 def _departures(a: Run, b: Run, allowed: Mapping[str, float | None]) -> Iterator[Departure]:
     for name, (tick, x, y) in _pairs(a, b):
-        finite = np.abs(x[np.isfinite(x)])
         relative = name.startswith(TELEMETRY)
-        scale = 1.0 / (float(finite.max()) or 1.0) if relative and finite.size else 1.0
+        scale = 1.0 / (max(_peak(x), _peak(y)) or 1.0) if relative else 1.0
         apart = _apart(x, y, name in _ANGLES) * scale
         apart = apart.reshape(len(tick), -1).max(axis=1, initial=0.0)
         worst = int(np.argmax(apart)) if apart.any() else None
@@ -226,6 +227,10 @@ def _departures(a: Run, b: Run, allowed: Mapping[str, float | None]) -> Iterator
             limit,
             int(tick[beyond[0]]) if beyond.size else None,
         )
+
+
+def _peak(values: Array) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _pairs(a: Run, b: Run) -> Iterator[tuple[str, tuple[Array, Array, Array]]]:

@@ -140,8 +140,21 @@ def test_telemetry_is_shown_and_judged_only_where_asked(run: Run) -> None:
     found = close(run, other)
     assert found.within
     assert 0 < departure(found, "telemetry error").largest < 1.1e-3
+    assert text(found).splitlines()[0] == "within tolerances: 200 ticks, 601 frames; TELEMETRY departs and is not judged"
+    assert "not judged" not in text(close(run, run))
+    assert "not judged" not in text(close(run, other, tolerances(["telemetry=1e-2"])))
     assert not close(run, other, tolerances(["telemetry=1e-5"])).within
     assert close(run, other, tolerances(["telemetry=1e-2"])).within
+
+
+def test_telemetry_departs_as_far_from_a_to_b_as_from_b_to_a(run: Run) -> None:
+    """A fraction of the larger of both peaks: a verdict must not depend on which run is named first."""
+    other = open_run(run.path)
+    other.telemetry["error_y"] = run.telemetry["error_y"] * 3.0
+    allowed = tolerances(["telemetry=0.8"])
+    there, back = close(run, other, allowed), close(other, run, allowed)
+    assert departure(there, "telemetry error").largest == departure(back, "telemetry error").largest
+    assert (there.within, back.within) == (True, True)
 
 
 @pytest.mark.parametrize(
