@@ -19,12 +19,14 @@ from sil.plants import PLANTS
 from sil.profiles import PROFILES
 from sil.scenario import json_schema
 from sil.scenario_metrics import METRICS
-from sil.scenario_sections import BOARDS, LINKS, SCALED
+from sil.scenario_sections import BOARDS, LINKS, Law
 from sil.scenario_source import SHORT
 from sil.scenario_validation import UNITS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 BOUNDS = ("below", "above", "between")
+# N of scaled:N from 0.01 to 1000, as sil.scenario_sections has it in SLOWEST and FASTEST
+SCALES = r"^scaled:(0*[1-9][0-9]{0,2}(\.[0-9]+)?|0*1000(\.0+)?|0+\.(0[1-9]|[1-9])[0-9]*)$"
 
 Schema = dict[str, Any]
 
@@ -38,6 +40,7 @@ def scenario_schema() -> Schema:
     for path, name in SHORT.items():
         _shorten(schema, path, name)
     known["Law"]["allOf"] = [_law_rule(name, known) for name in sorted({table.name for table in LAWS.values()})]
+    schema["if"], schema["then"] = _law_without_a_name()
     known["Requirement"]["oneOf"] = [_only(bound) for bound in BOUNDS]
     schema["properties"]["extends"]["description"] = "Scenario this one starts from: built-in name, or path from here."
     schema["description"] = "A scenario of sil: one test of an attitude controller. Every key has a default."
@@ -80,7 +83,7 @@ def _name_choices(schema: Schema) -> None:
     """The names that the program looks up, so that an editor can offer them."""
     known = schema["$defs"]
     metrics = [f"{name}.{part}" if part else name for name, parts in METRICS.items() for part in parts or ("",)]
-    clocks = _either(("lockstep", "realtime"), f"^{SCALED.pattern}$")
+    clocks = _either(("lockstep", "realtime"), SCALES)
     law_names = sorted({table.name for table in LAWS.values()})
     for section, key, choices in (
         (schema, "board", _either(BOARDS, r"^(serial|udp)://\S+$")),
@@ -136,6 +139,19 @@ def _law_rule(name: str, known: dict[str, Schema]) -> Schema:
         "if": {"properties": {"name": {"const": name}}, "required": ["name"]},
         "then": {"properties": properties},
     }
+
+
+def _law_without_a_name() -> tuple[Schema, Schema]:
+    """(if, then) of the whole file: parameters without a name are those of the law that flies by default.
+
+    Not where the file extends another one, which may name the law.
+    """
+    nameless = {"type": "object", "not": {"required": ["name"]}}
+    condition: Schema = {"required": ["law"], "properties": {"law": nameless, "extends": False}}
+    name = Law.model_fields["name"].default
+    one = sum(table.name == name for table in LAWS.values()) == 1
+    params = {"params": {"$ref": f"#/$defs/Params_{name}"}} if one else {}
+    return condition, {"properties": {"law": {"properties": params}}}
 
 
 def _params(table: LawTable) -> Schema:

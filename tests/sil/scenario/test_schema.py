@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from jsonschema import Draft7Validator
 from test_broken_scenarios import BROKEN, WARNINGS
@@ -29,8 +29,7 @@ VALIDATOR = Draft7Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 # What a schema of one file cannot know: other keys, other files, arithmetic. The loader and `sil check` do.
 BEYOND_A_SCHEMA = {
     "period of no whole number of us", "duration of no whole number of ticks", "infinite duration", "key given twice",
-    "broken YAML", "list at the top", "user law without its file", "steps out of order", "clock of speed zero",
-    "clock that rounds to zero", "clock too fast for HELLO", "impossible inertia", "inertia not symmetric",
+    "broken YAML", "list at the top", "user law without its file", "steps out of order", "impossible inertia", "inertia not symmetric",
     "quaternion of norm two", "torque scale too fine", "schedule with a board", "schedule that is not there",
     "extends nothing", "metrics after the end", "answer too slow", "line too slow", "period the law cannot use",
     "delay the law cannot use", "no delay in real time", "sensor that the law needs", "timeout longer than the period",
@@ -90,7 +89,8 @@ def test_what_is_beyond_a_schema_is_that_and_no_more() -> None:
      "actuators: {wheels: {torque_max_Nm: 0.1, momentum_max_Nms: [0.1, null, 1]}}",
      "plant: {inertia_kgm2: [2, 3, 3]}", "law: {name: mrac, params: {identify: on, trace_max: null}}",
      "law: {name: './mine.py:Mine', params: {anything: 1}}", "extends: mrac-rs232\nlaw: {params: {kappa: 0.2}}",
-     "require: [{metric: missed, below: 1, above: null}]"],
+     "require: [{metric: missed, below: 1, above: null}]", "law: {params: {controller_pole: 0.7}}",
+     "law: {form: float}"],
 )  # fmt: skip
 def test_short_forms_are_valid(short: str, tmp_path: Path) -> None:
     assert refused(short) == []
@@ -111,7 +111,8 @@ def test_every_short_form_of_the_loader_is_in_the_schema() -> None:
     "wrong",
     ["link: tcp", "clock: fast", "clock: {priority: 100}", "plant: {disturbance_Nm: [1, 2]}",
      "require: [{metric: missed}]", "law: {name: mrac, params: {kappa: two}}", "law: {name: mrac, version: 99}",
-     "timing: {max_degraded_fraction: 2}",
+     "timing: {max_degraded_fraction: 2}", "clock: scaled:5000", "clock: {mode: scaled:0}",
+     "law: {params: {nope: 1}}", "law: {params: {controller_pole: two}}",
      "guidance: {profile: steps, rows: [{t_s: 1, attitude_deg: [1, 2]}]}", "extends: 3"],
 )  # fmt: skip
 def test_wrong_short_and_long_forms_are_refused(wrong: str) -> None:
@@ -145,6 +146,25 @@ def test_the_schema_refuses_no_parameter_that_the_loader_takes(key: tuple[str, s
         return
     data = {"law": {"name": law, "params": {path.rpartition(".")[2]: value}}}
     assert [error.message for error in VALIDATOR.iter_errors(data)] == []
+
+
+@given(
+    st.floats(0, 2000).map(lambda number: f"{number:f}")
+    | st.integers(0, 2000).map(str)
+    | st.text("0123456789.", max_size=7)
+)
+@example("0.01")
+@example("0.009")
+@example("1000")
+@example("1000.1")
+@example("007.50")
+def test_the_speed_of_a_clock_is_that_of_the_loader(scale: str) -> None:
+    try:
+        load_scenario("appc-rs232", [f"clock.mode=scaled:{scale}"])
+        taken = True
+    except ScenarioInvalid:
+        taken = False
+    assert VALIDATOR.is_valid({"clock": f"scaled:{scale}"}) is taken
 
 
 def test_all_sections_of_the_model_are_there() -> None:
