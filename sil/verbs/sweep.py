@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from sil.trouble import UsageError
+from sil.trouble import EXIT_INTERRUPTED, UsageError
 from sil.verbs import completion
 from sil.verbs.options import (
     KEYS_PANEL,
@@ -188,7 +188,6 @@ def sweep(
     """
     from sil.campaign.conditions import conditions_from
     from sil.campaign.sweep import checked_workers, new_sweep, old_sweep
-    from sil.stopping import terminated_like_interrupted
 
     if keep is not None and keep not in KEEP:
         raise UsageError(f"--keep: expected one of {', '.join(KEEP)}, got {keep}")
@@ -210,17 +209,28 @@ def sweep(
             raise UsageError(
                 f"--resume: expected neither scenario nor keys beside it: {resume}/plan.json says them all"
             )
-        with terminated_like_interrupted():
-            return _fly(old_sweep(Path(resume), retry_failed), manner)
+        directory = Path(resume)
+        return _interruptible(lambda: _fly(old_sweep(directory, retry_failed), manner))
     if retry_failed or again:
         raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")
     if scenario is None:
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
     varied = [spec.key for spec in conditions.specs]
-    with terminated_like_interrupted():
-        base = _base(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
-        return _fly(new_sweep(base, conditions, out, _watch(manner)), manner)
+    base = _base(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
+    return _interruptible(lambda: _fly(new_sweep(base, conditions, out, _watch(manner)), manner))
+
+
+def _interruptible(action: Callable[[], int]) -> int:
+    """Planning ends at SIGTERM as at Ctrl-C, and says so; once points are flown, `fly` knows how to end."""
+    from sil.stopping import terminated_like_interrupted
+
+    try:
+        with terminated_like_interrupted():
+            return action()
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
 
 
 def _base(

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from subprocesses import alive, children_of, quiet
 
+from sil.verbs import sweep
+
 TABLES = ("results.csv", "results.json", "summary.json")
 SHORT = ("--set", "duration_s=20", "--set", "require=[]")
 DRAWN = ("--vary", "plant.initial.attitude_deg.0=uniform(-30,30)", "--vary", "plant.inertia_kgm2.0=uniform(1,8)")
@@ -28,7 +30,7 @@ CONDITIONS = (
 )
 
 WILD = """
-import os, signal
+import os, signal, time
 import numpy as np
 
 class Wild:
@@ -42,6 +44,8 @@ class Wild:
             os.kill(os.getpid(), signal.SIGKILL)
         if self.how == 2 and sample.tick == 5:
             raise RuntimeError("a bug of mine")
+        if os.path.exists("slow"):
+            time.sleep(0.05)
         print("a law may print")
         return np.zeros(3)
 """
@@ -134,6 +138,51 @@ def test_a_worker_that_dies_costs_its_point_only(cli):
     assert "wild.py (another content)" in err
 
 
+def test_a_kept_run_stays_until_its_point_was_flown_once_more(cli):
+    """--again is what one uses to look at a run: an interruption must not leave half of it in its place."""
+    (cli.folder / "wild.py").write_text(WILD)
+    (cli.folder / "wild.yaml").write_text("law: {name: ./wild.py:Wild, form: float}\n")
+    cli("sweep", "wild.yaml", "--vary", "seed=1:2", *SHORT, "-j", "1", "--keep", "all", "--out", "s")
+    kept = cli.folder / "s" / "runs" / "0001"
+    before = {file.name: file.read_bytes() for file in kept.iterdir()}
+    assert json.loads(before["summary.json"])["run_dir"] == str(kept)
+
+    (cli.folder / "slow").touch()
+    process = cli.start("sweep", "--resume", "s", "--again", "1")
+    wait_for(lambda: kept.with_name("0001.new").exists() or process.poll() is not None)
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    assert "interrupted after 0 of 1 points; go on with: sil sweep --resume s --again 1" in err
+    assert "point 1:" not in err
+    assert {file.name: file.read_bytes() for file in kept.iterdir()} == before
+    assert {folder.name for folder in kept.parent.iterdir()} == {"0001", "0002"}
+
+    (cli.folder / "slow").unlink()
+    _, err = cli("sweep", "--resume", "s", "--again", "1")
+    assert err.strip() == "point 1: s/runs/0001"
+    assert (kept / "run.mcap").read_bytes() == before["run.mcap"]
+    assert {folder.name for folder in kept.parent.iterdir()} == {"0001", "0002"}
+
+
+def test_a_sweep_that_is_terminated_while_it_plans_says_so(cli):
+    process = cli.start("sweep", "mrac-rs232", "--vary", "seed=1:100000", "--out", "s")
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("planning: ")
+    process.send_signal(signal.SIGTERM)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130 and err.endswith("interrupted\n")
+    assert not list(cli.folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("varied", "board"), [([], "inproc"), (["seed"], "inproc"), (["link.url"], "process"), (["board"], "process")]
+)
+def test_what_is_varied_of_link_and_board_is_not_set_aside(varied, board):
+    """In process there is no link: --vary link.url=pty,udp compared two runs of the same."""
+    assert sweep._base("mrac-rs232", [], varied, clock=None, link=None, board=None).board == board
+
+
 def test_requirements_and_refused_points_decide_the_exit_code(cli):
     strict = ("--set", "duration_s=20", "--set", "require=[{metric: rms_error_deg.max, below: 1e-9}]")
     summary = cli.json("sweep", "appc-rs232", "--vary", "plant.inertia_kgm2.0=2.13,7", *strict, "--out", "s", code=1)
@@ -151,6 +200,9 @@ def test_requirements_and_refused_points_decide_the_exit_code(cli):
         (["mrac-rs232", "--vary", "law.params.c2_pool=1,2"], "unknown key; known: design, c2_pole"),
         (["mrac-rs232", "--vary", "seed=gauss(1,2)"], "one of uniform, log, normal, choice"),
         (["--resume", "nowhere"], "expected the directory of a sweep"),
+        (["--resume", ""], "expected the directory of a sweep, got an empty text"),
+        (["--resume", "s", "--again", "1", "--keep", "none"], "--again: expected neither --keep nor"),
+        (["mrac-rs232", "--vary", "clock=realtime,lockstep"], "--clock says it for all points"),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(cli, arguments, said):

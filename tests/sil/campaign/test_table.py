@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 
 import pytest
 from rich.console import Console
@@ -15,7 +16,7 @@ from sil.campaign.records import Record
 from sil.scenario import load_scenario
 
 
-def shown(vary, records, draws=None, interrupted=False):
+def shown(vary, records, draws=None, interrupted=False, sweep_dir="sweeps/x-001"):
     plan = make_plan(
         load_scenario("mrac-rs232", ["board=inproc", "duration_s=5"]), conditions_from(None, vary, None, draws, 1)
     )
@@ -24,9 +25,10 @@ def shown(vary, records, draws=None, interrupted=False):
         "interrupted": interrupted,
         "wall_s": 1.0,
         "workers": 2,
-        "sweep_dir": "sweeps/x-001",
+        "sweep_dir": sweep_dir,
     }
     out = io.StringIO()
+    assert summary["excluded"] == sum(record.exit_code > 1 for record in records)
     table.show(summary, plan, records, Console(file=out, width=80, highlight=False, emoji=False))
     return out.getvalue()
 
@@ -65,6 +67,24 @@ def test_a_seed_that_decides_nothing_is_said():
     same = [flown(1, 0.1), flown(2, 0.1), flown(3, 0.2), flown(4, 0.2)]
     assert "the seed changes nothing here" in shown(vary, same)
     assert "the seed changes nothing here" not in shown(vary, [*same[:3], flown(4, 0.3)])
+
+
+def test_a_directory_is_shown_as_it_is_called():
+    assert "sweep: a[red]b/[/]c" in shown(["seed=1:4"], [flown(1, 0.1)], sweep_dir="a[red]b/[/]c")
+
+
+def test_what_the_statistics_leave_out_and_what_never_settled_is_said():
+    records = [flown(n, n / 100) for n in range(1, 10)]
+    records[0] = records[0]._replace(exit_code=3, verdict="failed", reason="link: gone")
+    for n in range(1, 9):
+        metrics = records[n].metrics | {"settling_s.max": math.inf if n > 3 else 20.0}
+        records[n] = records[n]._replace(metrics=metrics)
+    records[8] = records[8]._replace(metrics=records[8].metrics | {"diverged_at_s": 4.0})
+    text = shown(["sensors.attitude.noise_deg=uniform(0.01,0.05)"], records, draws=9)
+    assert "over 8 points, without 1 that did not end as planned; 1 diverged; 5 never settled" in " ".join(text.split())
+    (line,) = [line for line in text.splitlines() if line.startswith("settled after")]
+    assert line.split()[2:6] == ["never", "never", "never", "s"]
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_an_interruption_is_said_first_even_before_the_first_point():
