@@ -10,7 +10,10 @@ import typer
 
 from sil.trouble import EXIT_OK, EXIT_REQUIREMENT, UsageError
 from sil.verbs import completion
-from sil.verbs.options import JsonOption, RunArgument, opened, print_json
+from sil.verbs.options import RESULT_PANEL, JsonOption, RunArgument, opened, print_json
+
+DRAWN_PANEL = "What is drawn"
+COMPARED_PANEL = "How they are compared"
 
 
 def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
@@ -49,21 +52,36 @@ def plot(
             metavar="A,B",
             help="attitude, error, torque, momentum, rate, identification, lateness, answer, or any TELEMETRY triple "
             "of the law, such as g or trace; repeatable. Default: the usual four, and one of the identification.",
+            rich_help_panel=DRAWN_PANEL,
         ),
     ] = None,
     residuals: Annotated[
-        bool, typer.Option("--residuals", help="Several runs: also the difference of each to the first.")
+        bool,
+        typer.Option(
+            "--residuals",
+            help="Several runs: also the difference of each to the first.",
+            rich_help_panel=DRAWN_PANEL,
+        ),
     ] = False,
     time: Annotated[
-        str | None, typer.Option("--time", metavar="FROM:TO", help="The part to draw, s; 100: is from 100 s on.")
+        str | None,
+        typer.Option(
+            "--time",
+            metavar="FROM:TO",
+            help="The part to draw, s; 100: is from 100 s on.",
+            rich_help_panel=DRAWN_PANEL,
+        ),
     ] = None,
-    dark: Annotated[bool, typer.Option("--dark", help="For dark pages and slides.")] = False,
+    dark: Annotated[
+        bool, typer.Option("--dark", help="For dark pages and slides.", rich_help_panel=RESULT_PANEL)
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             help="PNG (overview), PDF (all pages) or a directory (every page as a PNG). Default: RUN/plot.png; "
             "of several runs plot-A-B.png here.",
+            rich_help_panel=RESULT_PANEL,
         ),
     ] = None,
 ) -> int:
@@ -122,7 +140,12 @@ def diff(
     a: RunArgument,
     b: RunArgument,
     close: Annotated[
-        bool, typer.Option("--close", help="Within tolerances, for logs from another machine, instead of bit for bit.")
+        bool,
+        typer.Option(
+            "--close",
+            help="Within tolerances, for logs from another machine, instead of bit for bit.",
+            rich_help_panel=COMPARED_PANEL,
+        ),
     ] = False,
     tolerance: Annotated[
         list[str] | None,
@@ -131,6 +154,7 @@ def diff(
             metavar="SIGNAL=VALUE",
             help="Another tolerance, such as attitude_deg=1e-9; the unit is the signal's, for telemetry a fraction of "
             "each word's peak. Means --close; repeatable.",
+            rich_help_panel=COMPARED_PANEL,
         ),
     ] = None,
     as_json: JsonOption = False,

@@ -300,3 +300,11 @@ def test_what_the_disk_says_is_told_of_its_file(error, code, said, monkeypatch, 
     monkeypatch.setattr("sil.scenario.load_scenario", fails)
     assert invoke(["run", "appc-rs232"]) == code
     assert capsys.readouterr().err == f"{said}\n"
+
+
+@pytest.mark.parametrize("verb", ["run", "plot", "diff", "compare", "export", "replay"])
+def test_options_of_a_verb_stand_in_named_groups(cli, verb):
+    """What is left in the unnamed group is --help: else a reader of plot or diff looks for the rest in vain."""
+    out, _ = cli(verb, "--help")
+    unnamed = out.partition("─ Options ─")[2].partition("╰")[0]
+    assert re.findall("--[a-z]+", unnamed) == ["--help"]

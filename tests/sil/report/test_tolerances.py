@@ -140,7 +140,8 @@ def test_telemetry_is_shown_and_judged_only_where_asked(run: Run) -> None:
     found = close(run, other)
     assert found.within
     assert 0 < departure(found, "telemetry error").largest < 1.1e-3
-    assert text(found).splitlines()[0] == "within tolerances: 200 ticks, 601 frames; TELEMETRY departs and is not judged"
+    verdict = text(found).splitlines()[0]
+    assert verdict == "within tolerances: 200 ticks, 601 frames; TELEMETRY departs and is not judged"
     assert "not judged" not in text(close(run, run))
     assert "not judged" not in text(close(run, other, tolerances(["telemetry=1e-2"])))
     assert not close(run, other, tolerances(["telemetry=1e-5"])).within
