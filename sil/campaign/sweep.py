@@ -23,7 +23,7 @@ from sil.campaign.results import RUNS, Results
 from sil.runner import new_run_dir, next_run_dir
 from sil.scenario import Scenario, load_values
 from sil.stopping import StopRequests
-from sil.trouble import EXIT_INTERRUPTED, SilError, UsageError
+from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, SilError, UsageError
 
 POLL_S = 0.1
 MOST_WORKERS = 256
@@ -143,6 +143,8 @@ def _fly(
             if following is None and not pool.busy():
                 return False
             for record in pool.poll(POLL_S):
+                if stop.asked() and record.exit_code == EXIT_LINK:
+                    continue  # what ends us may have ended the worker too: to be flown when the sweep goes on
                 _put_in_place(opened.directory, record)
                 opened.add(record)
                 watch.record(record)

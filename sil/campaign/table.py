@@ -46,6 +46,10 @@ def show(summary: Mapping[str, Any], plan: Plan, records: Sequence[Record], cons
 
 def _tables(console: Console, summary: Mapping[str, Any], plan: Plan, records: Sequence[Record]) -> None:
     """By point, by cell or by metric, whichever says most in few rows; then the reasons."""
+    if not summary["measured"]:
+        console.print("[dim]no statistics: no run came to its end[/]\n")
+        _reasons(console, records)
+        return
     single = len(records) <= MOST_ROWS and all(sum(cell["verdicts"].values()) == 1 for cell in summary["cells"])
     if summary["cells"] and single:
         console.print(_points(plan, records))

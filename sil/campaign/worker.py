@@ -51,7 +51,9 @@ def fly(setup: dict[str, Any], order: dict[str, Any]) -> Record:
     """
     folder = Path(order["folder"])
     began = time.perf_counter()
-    record = _flown(setup, order, folder)._replace(wall_s=round(time.perf_counter() - began, 6))
+    record = _flown(setup, order, folder)
+    reason = record.reason.replace(str(folder), "run directory")  # tables do not depend on where the sweep lies
+    record = record._replace(reason=reason, wall_s=round(time.perf_counter() - began, 6))
     if folder.exists() and (order["keep"] == "all" or (order["keep"] == "on-fail" and record.exit_code != 0)):
         try:
             _say_where(folder, folder.with_suffix(""))

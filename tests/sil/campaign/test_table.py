@@ -87,6 +87,11 @@ def test_what_the_statistics_leave_out_and_what_never_settled_is_said():
     assert max(map(len, text.splitlines())) <= 80
 
 
+def test_no_statistics_where_no_run_came_to_its_end():
+    text = shown(["seed=1:4"], [flown(1, 0.1)._replace(exit_code=3, verdict="failed", reason="gone", metrics={})])
+    assert "no statistics: no run came to its end" in text and "median" not in text and "gone" in text
+
+
 def test_an_interruption_is_said_first_even_before_the_first_point():
     assert shown(["seed=1:4"], [], interrupted=True).startswith("interrupted   mrac-rs232: 0 of 4 points")
     text = shown(["seed=1:4"], [flown(1, 0.1)], interrupted=True)

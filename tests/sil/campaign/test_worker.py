@@ -58,6 +58,15 @@ def test_only_the_scenario_itself_makes_a_point_invalid(tmp_path, monkeypatch, r
     assert record.verdict == ("invalid" if exit_code == 2 else "failed")
 
 
+def test_a_reason_does_not_say_where_the_sweep_lies(tmp_path, monkeypatch):
+    """results.csv has the same bytes wherever it was made, and the same reason is told once."""
+    folder = tmp_path / "0001.new"
+    monkeypatch.setattr(worker, "run_scenario", raises(OSError(f"{folder}: cannot write the log")))
+    setup = {"scenario": load_scenario("mrac-rs232").resolved(), "directory": ""}
+    record = worker.fly(setup, {"point": 1, "sets": [], "folder": str(folder), "keep": "none"})
+    assert record.reason == "OSError: run directory: cannot write the log (see workers.log)"
+
+
 @pytest.fixture
 def workers(tmp_path, monkeypatch):
     """workers(script, ...): a pool whose first, second... worker is one of these programs."""
