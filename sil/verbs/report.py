@@ -137,8 +137,12 @@ def export(
 
 
 def diff(
-    a: RunArgument,
-    b: RunArgument,
+    a: Annotated[
+        Path, typer.Argument(metavar="A", help="Run directory, or a run.mcap.", autocompletion=completion.runs)
+    ],
+    b: Annotated[
+        Path, typer.Argument(metavar="B", help="The run that is held against it.", autocompletion=completion.runs)
+    ],
     close: Annotated[
         bool,
         typer.Option(

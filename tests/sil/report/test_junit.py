@@ -6,6 +6,7 @@ class and a time. Neither schema knows <properties> inside of a testcase; every 
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sil.metrics import judge
+from sil.plain import plain
 from sil.report import junit
 from sil.report.junit_file import JunitFile
 from sil.scenario import Scenario, load_scenario
@@ -222,3 +224,12 @@ def test_what_is_no_place_for_a_file_is_refused_and_left(place: str) -> None:
     with pytest.raises(UsageError, match="--junit: "):
         junit.write(Path(place), "x")
     assert Path("/dev/null").is_char_device()
+
+
+def test_a_requirement_without_a_number_says_why() -> None:
+    """`got none` of an axis that never settled reads as if nothing had been measured."""
+    metrics = {"settling_s": [None, math.inf, 2.0]}
+    lines = [{"metric": f"settling_s.{part}", "below": 60.0} for part in ("roll", "max")]
+    cases = [junit._judged(plain(each._asdict())) for each in judge(lines, metrics)]
+    assert [case.message.partition(": ")[2] for case in cases] == ["got no step", "got never"]
+    assert [case.facts["value"] for case in cases] == ["no step", "never"]
