@@ -37,6 +37,7 @@ class Worker:
         )
         self.order: Order | None = None
         self.ready = False
+        self.nonsense = ""
         self._rest = b""
         self._send(setup)
 
@@ -51,7 +52,7 @@ class Worker:
         self._send(order)
 
     def records(self) -> list[Record] | None:
-        """Records that came since, of the point it is at; None when it is gone. Raises ValueError for anything else."""
+        """Records that came since, of the point it is at; None when it is gone. `nonsense` is set by anything else."""
         data = os.read(self.stdout.fileno(), 1 << 20)
         *whole, self._rest = (self._rest + data).split(b"\n")
         found = []
@@ -59,9 +60,13 @@ class Worker:
             if line == READY:
                 self.ready = True
                 continue
-            record = Record.read(line)
-            if self.order is None or record.point != self.order["point"]:
-                raise ValueError(f"expected a record of the point it was given, got one of point {record.point}")
+            try:
+                record = Record.read(line)
+                if self.order is None or record.point != self.order["point"]:
+                    raise ValueError(f"expected a record of the point it was given, got one of point {record.point}")
+            except ValueError as error:
+                self.nonsense = f"{error}"
+                break
             self.order = None
             found.append(record)
         return found if data else None
@@ -124,17 +129,14 @@ class Pool:
         """Records that came within `timeout_s`. Raises LinkFailure when a worker ends and none could ever begin."""
         for key, _ in self._selector.select(timeout_s):
             worker: Worker = key.data
-            try:
-                records = worker.records()
-            except ValueError as error:
-                worker.process.kill()
-                yield from self._gone(worker, f"the worker process was stopped, since it said what is none: {error}")
-                continue
+            records = worker.records()
             self._began = self._began or worker.ready
-            if records is None:
+            yield from records or ()
+            if worker.nonsense:
+                worker.process.kill()
+                yield from self._gone(worker, f"the worker process was stopped for what it said: {worker.nonsense}")
+            elif records is None:
                 yield from self._gone(worker)
-            else:
-                yield from records
 
     def close(self) -> None:
         """End all: idle ones because nothing more comes, busy ones at their next tick; nobody is left behind."""

@@ -102,8 +102,16 @@ def test_a_worker_that_says_what_is_no_record_of_its_point_costs_that_point(work
     flying = workers(script)
     assert flying.submit({"point": 1})
     (record,) = records_of(flying, 1)
-    assert (record.point, record.exit_code) == (1, 3) and "said what is none" in record.reason
+    assert (record.point, record.exit_code) == (1, 3) and "stopped for what it said" in record.reason
     assert not flying.busy()
+
+
+def test_a_record_before_nonsense_counts(workers):
+    flying = workers(GOOD.replace("sys.stdin.read()", "print('nonsense', flush=True); sys.stdin.read()"), GOOD)
+    flying.submit({"point": 1})
+    assert records_of(flying, 1) == [RECORD]
+    flying.submit({"point": 1})  # another worker, whether or not the first one's last words have come
+    assert records_of(flying, 1)[0].point == 1
 
 
 def test_a_worker_that_cannot_begin_costs_a_point_once_others_could(workers):
