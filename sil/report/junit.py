@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 from sil.metrics import judge
 from sil.report.whole_file import beside
+from sil.rig import board_and_link
 from sil.scenario_metrics import METRICS
 from sil.trouble import EXIT_OK, UsageError
 
@@ -129,15 +130,13 @@ def _number(value: float | None) -> str:
 
 def _facts_of(scenario: Scenario) -> dict[str, str]:
     law = scenario.law
-    flies = {
-        "law": f"{law.name} version {law.version}, {law.form}",
-        "link": scenario.board if "://" in scenario.board else scenario.link.url,
-    }
+    board, link = board_and_link(scenario)
+    flies = {"law": f"{law.name} version {law.version}, {law.form}", "link": link}
     versions = {f"version.{name}": version(name) for name in VERSIONS_OF}
     return {
         "seed": str(scenario.seed),
         "clock": scenario.clock.mode,
-        "board": scenario.board,
+        "board": board,
         **(flies if scenario.board != "none" else {}),
         **versions,
         "version.python": python_version(),

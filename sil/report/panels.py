@@ -32,7 +32,7 @@ def stack(run: Run, what: str, panels: Sequence[Panel], look: Look) -> Figure:
     figure, axes = _page(run, what, len(panels), look)
     for ax, panel in zip(axes, panels, strict=True):
         panel(ax, run, look)
-    if axes[0].get_legend() is None and len(axes[0].get_lines()) > 1:
+    if axes[0].get_legend() is None and len(axes[0].get_lines()) >= len(AXIS_NAMES):
         legend(axes[0], _axis_key(look), look)
     figure.align_ylabels(axes)
     return figure

@@ -32,7 +32,8 @@ def show_summary(summary: Mapping[str, Any], verbosity: int = NORMAL) -> None:
 
 def requirement_text(line: Mapping[str, Any]) -> str:
     """`rms_error_deg.roll < 0.5   got 0.0706`"""
-    return f"{line['requirement']}   got {'none' if line['value'] is None else format(line['value'], '.4g')}"
+    got = line.get("reason") or "none" if line["value"] is None else format(line["value"], ".4g")
+    return f"{line['requirement']}   got {got}"
 
 
 def show_table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
