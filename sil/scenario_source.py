@@ -112,7 +112,7 @@ def _override(source: Source, sets: Sequence[str]) -> Source:
         if not equals or not all(key.split(".")):
             raise ScenarioInvalid([Problem("--set", repr(text), "KEY=VALUE, such as law.form=float", "no KEY=")])
         value = read_value(value_text, where.file)
-        path: Path = tuple(int(part) if part.isdigit() else part for part in key.split("."))
+        path: Path = tuple(int(part) if part.isascii() and part.isdigit() else part for part in key.split("."))
         if any(isinstance(part, int) for part in path):
             into_lists.append((path, value, where))
         else:

@@ -92,7 +92,7 @@ def _mapping(node: yaml.MappingNode, path: Path, file: str, where: dict[Path, Wh
 def _scalar(text: str) -> Any:
     if text in WORDS:
         return WORDS[text]
-    if NUMBER_INT.fullmatch(text):
+    if NUMBER_INT.fullmatch(text) and len(text) <= MOST_DIGITS:
         return int(text, 0) if text[:2] in ("0x", "0o") else int(text)
     if NUMBER_FLOAT.fullmatch(text):
         return float(text)
