@@ -14,6 +14,7 @@ import yaml
 
 from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of
 
+MOST_DIGITS = 400  # a longer number is text: no key takes it, and Python refuses it
 NUMBER_INT = re.compile(r"[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+")
 NUMBER_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 NOT_FINITE = {".inf": float("inf"), "+.inf": float("inf"), "-.inf": -float("inf"), ".nan": float("nan")}
