@@ -46,8 +46,7 @@ def granted(clock: Clock, paced: bool, board_pid: int | None) -> Iterator[Grante
     refuse_impossible(clock)
     refused: list[str] = []
     with ExitStack() as undo:
-        if paced:
-            _timer_slack(undo)
+        _timer_slack(paced, undo)
         lab_cpu = _cpu(0, clock.lab_cpu, "clock.lab_cpu", refused, undo)
         board_cpu = _cpu(board_pid, clock.board_cpu, "clock.board_cpu", refused, undo)
         locked = _lock_memory(refused, undo) if clock.locks_memory else False
@@ -66,11 +65,12 @@ def refuse_impossible(clock: Clock) -> None:
             raise UsageError(f"{key}: expected a CPU this process may use, got {cpu}; known: {known}")
 
 
-def _timer_slack(undo: ExitStack) -> None:
+def _timer_slack(paced: bool, undo: ExitStack) -> None:
+    """Given back last: who comes back from SCHED_FIFO has the slack he was born with."""
     libc = ctypes.CDLL(None)
-    before = libc.prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0)
-    if before > 1 and libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0) == 0:
-        undo.callback(libc.prctl, PR_SET_TIMERSLACK, before, 0, 0, 0)
+    undo.callback(libc.prctl, PR_SET_TIMERSLACK, libc.prctl(PR_GET_TIMERSLACK, 0, 0, 0, 0), 0, 0, 0)
+    if paced:
+        libc.prctl(PR_SET_TIMERSLACK, 1, 0, 0, 0)
 
 
 def _freeze(undo: ExitStack) -> None:

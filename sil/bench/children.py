@@ -61,6 +61,8 @@ def run_child(
         )
     except OSError as error:
         raise ChildFailed(f"{command[0]}: {error.strerror or error}") from None
+    finally:
+        _prctl(PR_SET_TIMERSLACK, 0)  # the default again
     try:
         out, err = child.communicate(timeout=timeout_s)
     except subprocess.TimeoutExpired:
