@@ -102,15 +102,10 @@ class CompiledLaw(ABC):
         self.telemetry()
 
     def telemetry(self) -> list[int]:
-        """Words of TELEMETRY after the common ones, within the ranges of the law's table."""
+        """WORDS of TELEMETRY after the common ones, within the ranges of the law's table."""
         self._gather(self.state, self._places, self._lsb, self._words)
         words: list[int] = self._words.tolist()
         return words
-
-    def in_range(self, words: Sequence[int]) -> list[int]:
-        """Telemetry words within the ranges of the law's table."""
-        pairs = zip(words, self.RANGES, strict=True)
-        return [low if word < low else high if word > high else word for word, (low, high) in pairs]
 
     def field(self, name: str) -> np.ndarray:
         """A view of one field of the state, in the form's own units."""

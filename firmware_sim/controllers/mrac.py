@@ -22,7 +22,6 @@ Source: paper 004, eqs. of the unified method; study of paper 004, sections 1, 3
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -323,6 +322,7 @@ class Mrac(CompiledLaw):
 
     STATE = STATE
     RANGES = ranges_of(MRAC.telemetry)
+    WORDS = tuple((THETA + i, 2.0**-28) for i in range(15))
     functions = (step_float, step_fixed)
     compiled = (jit.compile(step_float), jit.compile(step_fixed))
 
@@ -369,10 +369,8 @@ class Mrac(CompiledLaw):
         return par + [shift_round(x, 1) for x in b] + [shift_round(x, -1) for x in b]
 
     def telemetry(self) -> list[int]:
-        s: list[Any] = self.state.tolist()
-        theta, covariance = s[THETA : THETA + 15], [s[F + 25 * i : F + 25 * i + 25 : 6] for i in range(3)]
-        if self.is_float:
-            words = [word_of(x, 2.0**-28) for x in theta] + [word_of(sum(f), 2.0**-16) for f in covariance]
-        else:
-            words = theta + [shift_round(sum(f), 4) for f in covariance]
-        return self.in_range(words)
+        """theta of the three axes, then the trace of each axis' covariance."""
+        traces = [sum(self.state[F + 25 * i : F + 25 * i + 25 : 6].tolist()) for i in range(3)]
+        words = [word_of(x, 2.0**-16) if self.is_float else shift_round(x, 4) for x in traces]
+        limits = self.RANGES[len(self.WORDS) :]
+        return super().telemetry() + [clip(word, *limit) for word, limit in zip(words, limits, strict=True)]
