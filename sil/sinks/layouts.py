@@ -150,9 +150,7 @@ TIMING = Layout(
         Field("int64", "gc_ns", 1, "of it (wall time): garbage collection"),
         Field("int64", "log_ns", 1, "of it (wall time): the journal's write"),
         Field("uint32", "tick", 1, "tick number"),
-        Field(
-            "uint32", "cause", 1, "late by: 0 nothing, 1 machine, 2 own work, 3 collection, 4 log, 5 answer, 6 link"
-        ),
+        Field("uint32", "cause", 1, "late by: 0 nothing, 1 machine, 2 own work, 3 collection, 4 log, 5 answer, 6 link"),
     ],
 )
 
