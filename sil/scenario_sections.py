@@ -17,7 +17,7 @@ Numbers3 = tuple[float, float, float]
 Limits3 = tuple[float | None, float | None, float | None]
 Matrix3 = tuple[Numbers3, Numbers3, Numbers3]
 
-BOARDS = ("process", "inproc", "none")
+BOARDS = ("process", "inproc", "native", "cortex-m", "qemu", "none")
 LINKS = ("pty", "udp", "inproc")
 SCALED = re.compile(r"scaled:[0-9]+(\.[0-9]+)?")
 SLOWEST, FASTEST = 0.01, 1000.0  # N of scaled:N; HELLO carries it as a Q16 number

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from protocol.frames import STOP_DONE
 from sil.bench.book import Book
 from sil.bench.children import ChildFailed, run_child, sil_command
-from sil.boards.process import child_environment
+from sil.launched import child_environment
 from sil.rig import assemble
 from sil.runner import run_scenario
 from sil.scenario import Scenario, load_scenario

@@ -11,7 +11,7 @@ from typing import Any
 
 from sil.bench.book import Book, Goal, Plan
 from sil.bench.children import run_child
-from sil.boards.process import child_environment
+from sil.launched import child_environment
 
 BESIDE = "empty compiled call"
 GOALS_US = {("appc", "float"): 5.0, ("mrac", "float"): 5.0, ("appc", "fixed"): 20.0, ("mrac", "fixed"): 20.0}

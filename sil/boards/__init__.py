@@ -13,8 +13,13 @@ from sil.plugins import load
 BOARDS = {
     "process": "sil.boards.process:ProcessBoard",
     "inproc": "sil.boards.inproc:InprocBoard",
+    "native": "sil.boards.native:NativeBoard",
+    "cortex-m": "sil.boards.cortex_m:CortexMBoard",
+    "qemu": "sil.boards.qemu:QemuBoard",
     "wired": "sil.boards.wired:WiredBoard",
 }
+FIRMWARE = ("native", "cortex-m", "qemu")  # the C firmware: laws of the product, in fixed point
+WITHOUT_TIMER = ("cortex-m", "qemu")  # emulated: they step by SAMPLE and TICK, so in lockstep only
 
 
 @dataclass(frozen=True)

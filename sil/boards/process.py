@@ -1,139 +1,18 @@
-"""The default board: the controller in a process of its own, over a pty or UDP on loopback."""
+"""The default board: the Python controller in a process of its own, over a pty or UDP on loopback."""
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import select
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-from typing import IO
-
-from protocol.links import Link, open_link
 from sil.boards import BoardOrder
-from sil.trouble import LinkFailure, UsageError
-
-START_S = 30.0
-STOP_S = 1.0
+from sil.launched import LaunchedBoard
 
 
-class ProcessBoard:
+class ProcessBoard(LaunchedBoard):
     """Launches `python -m firmware_sim` of this installation and talks to it over the link that the order names."""
 
-    def __init__(self, order: BoardOrder) -> None:
-        scheme = order.link_url.partition(":")[0]
-        if scheme not in ("pty", "udp"):
-            raise UsageError(
-                f"link: a board process is reached over pty or udp, got {order.link_url!r}; known: pty, udp"
-            )
-        self._log: IO[bytes] = open(order.log, "w+b") if order.log else tempfile.TemporaryFile()  # noqa: SIM115
-        self._child: subprocess.Popen[bytes] | None = None
-        self.link: Link = None  # type: ignore[assignment]  # until the child listens
-        try:
-            self.link = self._over_pty(order) if scheme == "pty" else self._over_udp(order)
-        except BaseException:
-            self.close()
-            raise
+    module = "firmware_sim"
+    what = "controller process"
 
-    @property
-    def pid(self) -> int | None:
-        return self._child.pid if self._child is not None else None
-
-    def check_alive(self) -> None:
-        assert self._child is not None
-        code = self._child.poll()
-        if code is not None:
-            raise LinkFailure(f"board: the controller process ended with {_describe(code)}{self._last_words()}")
-
-    def post_mortem(self, error: Exception) -> str:
-        """A process that is about to end is given a moment to say why."""
-        assert self._child is not None
-        try:
-            self._child.wait(STOP_S)
-            self.check_alive()
-        except subprocess.TimeoutExpired:
-            return str(error)
-        except LinkFailure as failure:
-            return str(failure)
-        return str(error)
-
-    def close(self) -> None:
-        """Unplug; a board that was told STOP, or whose pty is gone, ends by itself, and it has no state to lose."""
-        if self.link is not None:
-            self.link.close()
-        child = self._child
-        if child is not None:
-            try:
-                child.wait(STOP_S)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                child.wait()
-            if child.stdout:
-                child.stdout.close()
-        self._log.close()
-
-    def _over_pty(self, order: BoardOrder) -> Link:
-        link = open_link("pty", listen=False)
-        try:
-            self._launch(order, link.peer_url)
-            self._listening()
-        except BaseException:
-            link.close()
-            raise
-        return link
-
-    def _over_udp(self, order: BoardOrder) -> Link:
-        url = "udp://127.0.0.1:0" if order.link_url in ("udp", "udp:", "udp://") else order.link_url
-        self._launch(order, url)
-        return open_link(self._listening(), listen=False)
-
-    def _launch(self, order: BoardOrder, url: str) -> None:
-        command = [sys.executable, "-P", "-m", "firmware_sim", "--link", url, "--once", "--parent", str(os.getpid())]
-        if order.law_file:
-            command += ["--law", order.law_file]
-        if order.lock_memory:
-            command += ["--lock-memory"]
-        self._child = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=self._log,
-            env=child_environment(),
-            start_new_session=True,  # Ctrl-C in the terminal is the laboratory's to handle
-        )
-
-    def _listening(self) -> str:
-        """The URL the child says it listens on: its one line, after which its standard output is its standard error."""
-        child = self._child
-        assert child is not None and child.stdout is not None
-        poller = select.poll()
-        poller.register(child.stdout, select.POLLIN | select.POLLHUP)
-        if not poller.poll(START_S * 1000):
-            raise LinkFailure(f"board: the controller process did not start within {START_S:g} s")
-        line = child.stdout.readline().decode(errors="replace").strip()
-        if not line.startswith("listening "):
-            said = f"board: the controller process said {line!r}, expected 'listening URL'"
-            raise LinkFailure(self.post_mortem(LinkFailure(said)))
-        return line.removeprefix("listening ")
-
-    def _last_words(self) -> str:
-        """The last line of its stderr: the exception, when the law raised one."""
-        self._log.flush()
-        self._log.seek(0)
-        lines = [line for line in self._log.read().decode(errors="replace").splitlines() if line.strip()]
-        return f": {lines[-1].strip()}" if lines else ""
-
-
-def child_environment() -> dict[str, str]:
-    """With `python -P`, a child runs the package that this process runs, not what lies in its working directory."""
-    spec = importlib.util.find_spec("firmware_sim")
-    assert spec is not None and spec.origin is not None
-    home = str(Path(spec.origin).parent.parent)
-    paths = [home, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-
-
-def _describe(code: int) -> str:
-    return f"signal {-code}" if code < 0 else f"exit code {code}"
+    def options(self, order: BoardOrder) -> list[str]:
+        """A user's own law, and whether to lock memory."""
+        law = ["--law", order.law_file] if order.law_file else []
+        return [*law, *(["--lock-memory"] if order.lock_memory else [])]

@@ -14,8 +14,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
-from sil.boards.process import child_environment
 from sil.campaign.records import Record, broken
+from sil.launched import child_environment
 from sil.trouble import LinkFailure
 
 STOP_S = 5.0

@@ -217,7 +217,7 @@ def compiled_code(around: Surroundings) -> Finding:
 
     Asked of a process that is started as a board process is: it has to start, and may see other things than we do.
     """
-    from sil.boards.process import child_environment
+    from sil.launched import child_environment
 
     command = [sys.executable, "-P", "-c", ASK_CACHES]
     done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, timeout=ASK_CACHES_S)

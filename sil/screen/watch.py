@@ -19,7 +19,7 @@ from collections import Counter
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from sil.boards.process import child_environment
+from sil.launched import child_environment
 from sil.screen import QUIET, VERBOSE, facts, messages
 from sil.screen.messages import END_FRAME, SHOW_CURSOR, End, Line, Message, Plan
 from sil.screen.reading import Reader, plan_of

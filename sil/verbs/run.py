@@ -167,7 +167,7 @@ def board(
         *(["--law", law] if law else []),
         *(["--once"] if once else []),
     ]
-    from sil.boards.process import child_environment
+    from sil.launched import child_environment
 
     os.execve(sys.executable, [sys.executable, *arguments], child_environment())
 
