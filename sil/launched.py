@@ -1,6 +1,6 @@
 """Boards that we start ourselves: a process on the other end of a pty or of UDP on loopback, watched while it lives.
 
-The process is `python -m MODULE --link URL --once --parent PID`. It says one line on its standard output, `listening
+The process is `python -m MODULE --link URL --parent PID [--once]`. It says one line on its standard output, `listening
 URL`, and from then on it speaks frames. Whatever it has to say to a person goes to its standard error, which is the
 log. Where it cannot start as it was asked to, it ends with exit code 2 before that line, and its last line says why.
 """
@@ -51,7 +51,7 @@ class LaunchedBoard:
             raise
 
     def options(self, order: BoardOrder) -> list[str]:
-        """More arguments for the module, after --link, --once and --parent."""
+        """More arguments for the module, after --link, --parent and, for a single session, --once."""
         return []
 
     @property
@@ -107,9 +107,10 @@ class LaunchedBoard:
         return open_link(self._listening(), listen=False)
 
     def _launch(self, order: BoardOrder, url: str) -> None:
-        command = [sys.executable, "-P", "-m", self.module, "--link", url, "--once", "--parent", str(os.getpid())]
+        command = [sys.executable, "-P", "-m", self.module, "--link", url, "--parent", str(os.getpid())]
+        once = ["--once"] if order.once else []
         self._child = subprocess.Popen(
-            [*command, *self.options(order)],
+            [*command, *once, *self.options(order)],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=self._log,

@@ -24,13 +24,17 @@ WITHOUT_TIMER = ("cortex-m", "qemu")  # emulated: they step by SAMPLE and TICK, 
 
 @dataclass(frozen=True)
 class BoardOrder:
-    """What a run asks of a board. `law_file`: `/abs/file.py:Class` of a user's law, or "". `log`: for its stderr."""
+    """What a run asks of a board. `law_file`: `/abs/file.py:Class` of a user's law, or "". `log`: for its stderr.
+
+    `once`: a board process of ours ends with its first session; else it serves until its link is closed.
+    """
 
     link_url: str
     law_file: str
     log: Path | None
     notify: Callable[[str], None]
     lock_memory: bool = False
+    once: bool = True
 
 
 class BoardHost(Protocol):
