@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from firmware_sim import fixed
-from firmware_sim.controllers.compiled import CompiledLaw, Step, offsets
+from firmware_sim.controllers.compiled import CompiledLaw, Step
+from firmware_sim.fields import offsets
 
 
 class RegisterOverflow(ArithmeticError):

@@ -35,6 +35,7 @@ def header() -> str:
         NOTE,
         "#ifndef CORE_GENERATED_LAW_TABLES_H\n#define CORE_GENERATED_LAW_TABLES_H\n",
         "#include <stdint.h>\n",
+        "/* The built-in laws. */\n" + "".join(map(_identity, tables)),
         f"/* CONFIG, common words. */\n{_indices('COMMON', COMMON)}",
         *(f"/* CONFIG words of {table.name}, from the law's first. */\n{_indices(_prefix(table), table.params)}"
           for table in tables),
@@ -71,6 +72,11 @@ def source() -> str:
 
 def _prefix(table: LawTable) -> str:
     return table.name.upper()
+
+
+def _identity(table: LawTable) -> str:
+    prefix = _prefix(table)
+    return f"enum {{ {prefix}_LAW_ID = {table.law_id}, {prefix}_LAW_VERSION = {table.version} }};\n"
 
 
 def _indices(prefix: str, words: Sequence[Word]) -> str:

@@ -14,6 +14,8 @@ from pathlib import Path
 
 GENERATED = Path(__file__).parent.parent / "firmware" / "core" / "generated"
 FILES = {  # file: the function that makes its text
+    "frames.h": "tools.c_frames:header",
+    "law_states.h": "tools.c_states:law_states_h",
     "law_tables.h": "tools.c_law_tables:header",
     "law_tables.c": "tools.c_law_tables:source",
 }

@@ -26,7 +26,7 @@ import math
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed
+from firmware_sim.controllers.compiled import CompiledLaw, ranges_of, torque_limits_fixed
 from firmware_sim.controllers.gain import (
     learn_fixed,
     learn_float,
@@ -46,6 +46,7 @@ from firmware_sim.controllers.kinematics import (
     torque_scales_fixed,
     triple,
 )
+from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
 from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_fixed, restart_float, wrap_pi
 from protocol.law_tables import APPC, AXES, Configuration
@@ -73,9 +74,28 @@ STATE = (
 (Y, V, W, G, G_INV, P, APPLIED, BEFORE, COMMAND, READING, READING_BEFORE, INNOVATION, H, RESPONSE, DRIVE, STEPS,
  RESTARTED, ARITHMETIC) = offsets(STATE)  # fmt: skip
 
-# Parameters of both forms; fixed: Q30, torque Q28, DRIVE_* and DEMAND_* mantissas and shifts (kinematics.py).
-TS, TS_INV, K1, K2, L1, L2, L3, ADAPT, GYRO, ORBIT, TORQUE_SHIFT, MOMENTUM_SHIFT = range(12)
-LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT = 12, 15, 18, 21, 24
+# Parameters of both forms; mantissas and shifts of the fixed form as in kinematics.py.
+PAR = (
+    Field("ts", 1, "s", 30),
+    Field("ts_inv", 1, "1/s", 28),
+    Field("k1", 1, "1", 30),
+    Field("k2", 1, "1", 30),
+    Field("l1", 1, "1", 30),
+    Field("l2", 1, "1", 30),
+    Field("l3", 1, "1", 30),
+    Field("adapt", 1, "", 0),
+    Field("gyro", 1, "", 0),
+    Field("orbit", 1, "turn/sample", 36),
+    Field("torque_shift", 1, "bit", 0),
+    Field("momentum_shift", 1, "bit", 0),
+    Field("limit", 3, "N m", 28),
+    Field("torque_of", 3, "N m Q28 per turn/sample^2 Q36", 0, shift="demand_shift"),
+    Field("drive_of", 3, "turn/sample^2 Q36 per N m Q28", 0, shift="drive_shift"),
+    Field("demand_shift", 3, "bit", 0),
+    Field("drive_shift", 3, "bit", 0),
+)
+(TS, TS_INV, K1, K2, L1, L2, L3, ADAPT, GYRO, ORBIT, TORQUE_SHIFT, MOMENTUM_SHIFT, LIMIT, TORQUE_OF, DRIVE_OF,
+ DEMAND_SHIFT, DRIVE_SHIFT) = offsets(PAR)  # fmt: skip
 
 START_STEPS = 4
 LEARN_FROM = 25
@@ -348,7 +368,7 @@ def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarra
 class Appc(CompiledLaw):
     """The law `appc` in the form of the configuration."""
 
-    STATE = STATE
+    STATE, PAR = STATE, PAR
     RANGES = ranges_of(APPC.telemetry)
     WORDS = tuple(
         (field + i, lsb)

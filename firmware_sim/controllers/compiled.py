@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar, NamedTuple, TypeAlias
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
 from firmware_sim import jit
+from firmware_sim.fields import Field, offsets, size
 from firmware_sim.fixed import INT32_MAX, INT32_MIN, clip, div_trunc, shift_round
 from protocol.law_tables import AXES, FORM_FLOAT, Configuration, Word, refusal
 
@@ -20,37 +21,15 @@ class LawRefuses(ValueError):
     """The law cannot fly with this configuration; the message says why in one line."""
 
 
-class Field(NamedTuple):
-    """One field of a law's state: `length` numbers; fixed form: `q` fractional bits of `unit`, `width` bits each."""
-
-    name: str
-    length: int
-    unit: str
-    q: int
-    width: int = 32
-
-
-def offsets(fields: Sequence[Field]) -> tuple[int, ...]:
-    """Index of each field's first number."""
-    starts = [0]
-    for field in fields:
-        starts.append(starts[-1] + field.length)
-    return tuple(starts[:-1])
-
-
-def size(fields: Sequence[Field]) -> int:
-    """Length of the state array."""
-    return sum(field.length for field in fields)
-
-
 class CompiledLaw(ABC):
     """Base of pd, mrac and appc: `state` and `par` are int64 (fixed) or float64 arrays, `step` runs one function.
 
-    A law gives STATE, RANGES, `functions` and `compiled` (float step, fixed step, as source and compiled), the
+    A law gives STATE, PAR, RANGES, `functions` and `compiled` (float step, fixed step, as source and compiled), the
     parameters, and WORDS or telemetry().
     """
 
     STATE: ClassVar[tuple[Field, ...]]
+    PAR: ClassVar[tuple[Field, ...]]
     RANGES: ClassVar[Ranges]  # of its telemetry words
     WORDS: ClassVar[tuple[tuple[int, float], ...]] = ()  # each word: its place in the state, LSB of the float form
     functions: ClassVar[tuple[Step, Step]]

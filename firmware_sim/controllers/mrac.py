@@ -28,9 +28,7 @@ import numpy as np
 from firmware_sim import jit
 from firmware_sim.controllers.compiled import (
     CompiledLaw,
-    Field,
     LawRefuses,
-    offsets,
     ranges_of,
     torque_limits_fixed,
     word_of,
@@ -44,6 +42,7 @@ from firmware_sim.controllers.kinematics import (
     triple,
 )
 from firmware_sim.controllers.rls import identify_fixed, identify_float
+from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import AHEAD, NEXT, NOW, PAST
 from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, Configuration
@@ -67,9 +66,29 @@ STATE = (
 )
 (THETA, F, Y, Y_BEFORE, INPUT, BEFORE, OLD, COMMAND, ETA, RATE, PHI, F_PHI, GAIN, STEPS, ARITHMETIC) = offsets(STATE)
 
-# Parameters of both forms; fixed: c1, c2 Q28, the others Q30, mantissas and shifts as in kinematics.py.
-PRINTED, C1, C2, KAPPA, KAPPA_INV, FORGETTING, FORGETTING_INV, TRACE_MAX, DECOUPLE, IDENTIFY, TORQUE_SHIFT = range(11)
-LIMIT, TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT, B0_MIN, B0_MAX = 11, 14, 17, 20, 23, 26, 29
+# Parameters of both forms; mantissas and shifts of the fixed form as in kinematics.py.
+PAR = (
+    Field("printed", 1, "", 0),
+    Field("c1", 1, "1", 28),
+    Field("c2", 1, "1", 28),
+    Field("kappa", 1, "1", 30),
+    Field("kappa_inv", 1, "1", 30),
+    Field("forgetting", 1, "1", 30),
+    Field("forgetting_inv", 1, "1", 30),
+    Field("trace_max", 1, "1", 20),
+    Field("decouple", 1, "", 0),
+    Field("identify", 1, "", 0),
+    Field("torque_shift", 1, "bit", 0),
+    Field("limit", 3, "N m", 28),
+    Field("torque_of", 3, "N m Q28 per turn/sample^2 Q36", 0, shift="demand_shift"),
+    Field("drive_of", 3, "turn/sample^2 Q36 per N m Q28", 0, shift="drive_shift"),
+    Field("demand_shift", 3, "bit", 0),
+    Field("drive_shift", 3, "bit", 0),
+    Field("b0_min", 3, "rad/(N m)", 28),
+    Field("b0_max", 3, "rad/(N m)", 28),
+)
+(PRINTED, C1, C2, KAPPA, KAPPA_INV, FORGETTING, FORGETTING_INV, TRACE_MAX, DECOUPLE, IDENTIFY, TORQUE_SHIFT, LIMIT,
+ TORQUE_OF, DRIVE_OF, DEMAND_SHIFT, DRIVE_SHIFT, B0_MIN, B0_MAX) = offsets(PAR)  # fmt: skip
 
 STEPS_MAX = 1000000
 TURN = 2.0 * math.pi
@@ -320,7 +339,7 @@ def nominal_fixed(mantissa: int, shift: int) -> int:
 class Mrac(CompiledLaw):
     """The law `mrac` in the form of the configuration."""
 
-    STATE = STATE
+    STATE, PAR = STATE, PAR
     RANGES = ranges_of(MRAC.telemetry)
     WORDS = tuple((THETA + i, 2.0**-28) for i in range(15))
     functions = (step_float, step_fixed)

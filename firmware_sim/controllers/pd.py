@@ -15,7 +15,8 @@ import math
 import numpy as np
 
 from firmware_sim import jit
-from firmware_sim.controllers.compiled import CompiledLaw, Field, offsets, ranges_of, torque_limits_fixed
+from firmware_sim.controllers.compiled import CompiledLaw, ranges_of, torque_limits_fixed
+from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import clip, div_trunc, keep32, mul_q, norm_shift, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import NOW, wrap_pi
 from protocol.law_tables import AXES, PD, Configuration
@@ -29,8 +30,16 @@ STATE = (
     Field("arithmetic", 1, "", 0),
 )
 READING, CHANGE, COMMAND, ERROR, GAP, ARITHMETIC = offsets(STATE)
-# Parameters of both forms; the shifts are the fixed form's.
-KP, KD, LIMIT, KP_SHIFT, KD_SHIFT, TORQUE_SHIFT = 0, 3, 6, 9, 10, 13
+# Parameters of both forms; the shifts are the fixed form's. kd is kd / T_s.
+PAR = (
+    Field("kp", 3, "N m Q28 per rad Q29", 0, shift="kp_shift"),
+    Field("kd", 3, "N m Q28 per rad/sample Q29", 0, shift="kd_shift"),
+    Field("limit", 3, "N m", 28),
+    Field("kp_shift", 1, "bit", 0),
+    Field("kd_shift", 3, "bit", 0),
+    Field("torque_shift", 1, "bit", 0),
+)
+KP, KD, LIMIT, KP_SHIFT, KD_SHIFT, TORQUE_SHIFT = offsets(PAR)
 GAP_MAX = 1000000
 
 
@@ -96,7 +105,7 @@ def per_sample_fixed(gain: int, bits: int, period_us: int) -> tuple[int, int]:
 class Pd(CompiledLaw):
     """The law `pd` in the form of the configuration."""
 
-    STATE = STATE
+    STATE, PAR = STATE, PAR
     RANGES = ranges_of(PD.telemetry)
     WORDS = tuple((ERROR + i, math.pi / 2**31) for i in range(3))
     has_model = False

@@ -22,17 +22,37 @@ from collections.abc import Mapping
 import numpy as np
 
 from firmware_sim import jit
+from firmware_sim.fields import Field, offsets, size
 from firmware_sim.fixed import INT32_MAX, clip, div_trunc, mul_q, mul_wide, sat32, shift_round, wrap32, wrap_bits
 from protocol.law_tables import COMMON, REFERENCE_NONE, REFERENCE_PAPER, REFERENCE_ZOH, dequantise
 
 # Layout of `state`; the first seven are for the laws, three axes each.
-PAST, NOW, NEXT, AHEAD = 0, 3, 6, 9  # ym(k-1), ym(k), ym(k+1), ym(k+2); with lead 1 AHEAD is extrapolated
-RATE_NOW, RATE_NEXT, ACCEL = 12, 15, 18  # vm(k), vm(k+1), am that r(k) brought
-HEAD, HEAD_RATE = 21, 24  # ym and vm at k + lead, 2^-48 turn
-STARTED, SATURATED, LEAD = 27, 28, 29
-SIZE = 30
+STATE = (
+    Field("past", 3, "turn", 32),  # ym(k-1)
+    Field("now", 3, "turn", 32),  # ym(k)
+    Field("next", 3, "turn", 32),  # ym(k+1)
+    Field("ahead", 3, "turn", 32),  # ym(k+2); with lead 1 it is extrapolated
+    Field("rate_now", 3, "turn/sample", 36),  # vm(k)
+    Field("rate_next", 3, "turn/sample", 36),  # vm(k+1)
+    Field("accel", 3, "turn/sample^2", 36),  # am that r(k) brought
+    Field("head", 3, "turn", 48, 64),  # ym at k + lead
+    Field("head_rate", 3, "turn/sample", 48, 64),  # vm at k + lead
+    Field("started", 1, "", 0),
+    Field("saturated", 1, "", 0),
+    Field("lead", 1, "tick", 0),
+)
+PAST, NOW, NEXT, AHEAD, RATE_NOW, RATE_NEXT, ACCEL, HEAD, HEAD_RATE, STARTED, SATURATED, LEAD = offsets(STATE)
+SIZE = size(STATE)
 # Layout of the parameters.
-KIND, K1, K2, START, ACCEL_MAX, RATE_MAX = range(6)
+PAR = (
+    Field("kind", 1, "", 0),
+    Field("k1", 1, "1", 46, 64),
+    Field("k2", 1, "1", 30),
+    Field("start", 1, "1", 46, 64),
+    Field("accel_max", 1, "turn/sample^2", 48, 64),
+    Field("rate_max", 1, "turn/sample", 48, 64),
+)
+KIND, K1, K2, START, ACCEL_MAX, RATE_MAX = offsets(PAR)
 
 RATE_LIMIT_48 = 1 << 46  # a quarter turn per sample: the largest rate the integers carry
 

@@ -5,6 +5,11 @@
 
 #include <stdint.h>
 
+/* The built-in laws. */
+enum { PD_LAW_ID = 1, PD_LAW_VERSION = 1 };
+enum { MRAC_LAW_ID = 2, MRAC_LAW_VERSION = 1 };
+enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 1 };
+
 /* CONFIG, common words. */
 enum {
     COMMON_LAW_ID = 0,                   /* selects, with law_version, the table of this law */
