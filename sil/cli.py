@@ -15,7 +15,7 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import bench, compare, completion, doctor, replay, report, run, scenario, sweep
+from sil.verbs import bench, compare, completion, doctor, ladder, replay, report, run, scenario, sweep
 from sil.verbs.manual import exit_codes, page_of
 
 app = typer.Typer(
@@ -61,7 +61,7 @@ def sil(
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, compare.compare, report.export, report.diff),
-    "Study": (sweep.sweep, bench.bench),
+    "Study": (ladder.ladder, sweep.sweep, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor),
 }
 for _panel, _verbs in VERBS.items():

@@ -78,6 +78,11 @@ def of_replay(name: str, facts: Facts, difference: str) -> str:
     return _text(name, facts, [case])
 
 
+def of_cases(name: str, facts: Facts, cases: Iterable[Case]) -> str:
+    """The XML of any other test that consists of cases."""
+    return _text(name, facts, cases)
+
+
 def _run_case(summary: Mapping[str, Any]) -> Case:
     """Everything that can be wrong with a run, its requirements apart."""
     timing = summary["timing"]

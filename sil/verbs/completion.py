@@ -68,6 +68,11 @@ def boards(incomplete: str) -> list[Offer]:
     return _fitting([*BOARDS, *_devices()], incomplete)
 
 
+def rungs(incomplete: str) -> list[Offer]:
+    """What `sil ladder --with` adds to the usual rungs."""
+    return _fitting([("qemu", "the firmware's image in QEMU"), *_devices()], incomplete)
+
+
 def links(incomplete: str) -> list[Offer]:
     return _fitting([*LINKS, *_devices()], incomplete)
 
