@@ -1,0 +1,15 @@
+/* The laws of this board: one line each. */
+#include "appc.h"
+#include "mrac.h"
+#include "pd.h"
+
+static const law *const LAWS[] = {&PD_LAW, &MRAC_LAW, &APPC_LAW};
+
+const law *law_find(uint16_t id, uint16_t version) {
+    for (size_t i = 0; i < sizeof LAWS / sizeof LAWS[0]; i++) {
+        if (LAWS[i]->id == id && LAWS[i]->version == version) {
+            return LAWS[i];
+        }
+    }
+    return NULL;
+}
