@@ -25,7 +25,7 @@ typedef struct hal {
     bool (*wait)(void *self, int64_t until_ns);
 
     /* Moves up to size received bytes to into; never waits. Returns how many, 0 when none are there. With datagram set:
-     * one whole datagram per call, at most size bytes of it. size is at least 256. */
+     * one whole datagram per call, at most size bytes of it (an empty one is none). size is at least 256. */
     size_t (*read)(void *self, uint8_t *into, size_t size);
 
     /* Hands over all size bytes of one answer, or of one datagram. May wait until there is room for them. */
@@ -39,7 +39,7 @@ typedef struct hal {
     bool datagram;     /* read and write move whole packets, no COBS */
     const char *build; /* for HELLO, at most 24 printable ASCII characters */
 
-    /* Health, written by the hal at any time, read by the board for TIMING. NULL: all zero. */
+    /* Health, written by the hal at any time, read by the board for TIMING. NULL: the board sends no TIMING. */
     const volatile struct hal_health *health;
 } hal;
 
