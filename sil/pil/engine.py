@@ -94,7 +94,7 @@ class Engine:
 
     def write_registers(self, values: Sequence[int]) -> None:
         """The first so many of REGISTERS."""
-        words: list[_U32 | int] = [*values]
+        words: list[ctypes.c_uint32 | int] = [*values]
         self._values[: len(words)] = words
         numbers, places, _ = self._batch
         self._must(self._lib.uc_reg_write_batch(self._handle, numbers, places, len(values)))
