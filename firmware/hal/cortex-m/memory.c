@@ -1,10 +1,7 @@
-/* memcpy, memset and memcmp: the three that a compiler may call without being asked. */
-#include <stddef.h>
-#include <stdint.h>
+/* memcpy, memset and memcmp, by words where both ends are aligned; and clang's other names for them. */
+#include "string.h"
 
-void *memcpy(void *restrict to, const void *restrict from, size_t size);
-void *memset(void *to, int value, size_t size);
-int memcmp(const void *left, const void *right, size_t size);
+#include <stdint.h>
 
 typedef uint32_t __attribute__((may_alias)) word;
 
@@ -35,3 +32,17 @@ int memcmp(const void *left, const void *right, size_t size) {
     }
     return 0;
 }
+
+/* Arm's run-time ABI, IHI 0043; 4 and 8: that alignment is promised. */
+#define ALSO(name, type, parameters, ...) \
+    type name parameters; \
+    type name parameters { __VA_ARGS__; }
+ALSO(__aeabi_memcpy, void, (void *to, const void *from, size_t size), memcpy(to, from, size))
+ALSO(__aeabi_memcpy4, void, (void *to, const void *from, size_t size), memcpy(to, from, size))
+ALSO(__aeabi_memcpy8, void, (void *to, const void *from, size_t size), memcpy(to, from, size))
+ALSO(__aeabi_memset, void, (void *to, size_t size, int value), memset(to, value, size))
+ALSO(__aeabi_memset4, void, (void *to, size_t size, int value), memset(to, value, size))
+ALSO(__aeabi_memset8, void, (void *to, size_t size, int value), memset(to, value, size))
+ALSO(__aeabi_memclr, void, (void *to, size_t size), memset(to, 0, size))
+ALSO(__aeabi_memclr4, void, (void *to, size_t size), memset(to, 0, size))
+ALSO(__aeabi_memclr8, void, (void *to, size_t size), memset(to, 0, size))
