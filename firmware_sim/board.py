@@ -169,6 +169,9 @@ class Board:
         flight = self._flight
         if flight is None or self.timer_ns is None:
             return
+        if self._next_tick == frames.NO_TICK:  # the last tick there is was stepped
+            self.timer_ns = None
+            return
         self.timer_ns += self._wall_ns(flight.period_ns)
         self._step(None)
 

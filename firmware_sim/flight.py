@@ -99,7 +99,7 @@ class Flight:
         """A SAMPLE for a tick that was already stepped."""
         self._dropped += 1
         if len(self._pending) < EVENTS_PER_ANSWER:
-            self._pending.append(Event(tick, events.STALE_SAMPLE, tick & 0x7FFFFFFF, self._dropped))
+            self._pending.append(Event(tick, events.STALE_SAMPLE, _word(tick), self._dropped))
 
     def restart(self, expected: int, tick: int) -> None:
         """Bumpless re-start: the gap is too long to propagate; law and reference begin anew at the next reading.
@@ -108,7 +108,7 @@ class Flight:
         """
         self._begin()
         self._restarted = True
-        self._pending.insert(0, Event(tick, events.RESTARTED, expected, tick))  # first: never one too many
+        self._pending.insert(0, Event(tick, events.RESTARTED, _word(expected), _word(tick)))  # first: never one too many
 
     _restarted = False
 
@@ -125,11 +125,11 @@ class Flight:
             torque = (0, 0, 0)
         if overrun:
             flags |= frames.FLAG_OVERRUN
-            notices.append(Event(tick, events.OVERRUN, tick, self._overruns))
+            notices.append(Event(tick, events.OVERRUN, _word(tick), self._overruns))
         elif sample is not None and not usable:
             notices.append(Event(tick, events.READING_INVALID, self._needs, sample.valid))
         if not usable:
-            notices.append(Event(tick, events.SAMPLE_LOST, tick, self._lost))
+            notices.append(Event(tick, events.SAMPLE_LOST, _word(tick), self._lost))
         self._sent = [*self._sent[1:], torque]
         return self._answer(tick, torque, flags, usable, notices)
 
@@ -192,7 +192,7 @@ class Flight:
         flags = int(self._out[3])
         arithmetic = bool(flags & frames.FLAG_ARITHMETIC)
         if arithmetic and not self._arithmetic:
-            notices.append(Event(tick, events.ARITHMETIC_SATURATION, tick, 0))
+            notices.append(Event(tick, events.ARITHMETIC_SATURATION, _word(tick), 0))
         self._arithmetic = arithmetic
         torque = self._to_wire(notices, tick)
         limited = tuple(max(-m, min(m, u)) for u, m in zip(torque, self._limits, strict=True))
@@ -218,7 +218,7 @@ class Flight:
         tripped = self._since_sample >= self._link_limit
         if tripped != self._watchdog:
             code = events.WATCHDOG_ON if tripped else events.WATCHDOG_OFF
-            notices.append(Event(tick, code, tick, self._since_sample))
+            notices.append(Event(tick, code, _word(tick), self._since_sample))
             self._watchdog = tripped
         return frames.FLAG_WATCHDOG if tripped else 0
 
@@ -238,3 +238,8 @@ class Flight:
     def _telemetry(self) -> tuple[int, ...]:
         counters = (self._lost, self._overruns, self._dropped, self._saturations)
         return (*self._reference.words(), *self._setpoint, *counters, *self._law.telemetry())
+
+
+def _word(tick: int) -> int:
+    """A tick number as an event carries it: modulo 2^31."""
+    return tick & INT32_MAX

@@ -316,9 +316,7 @@ def parse_configuration(words: Sequence[int], user: LawTable | None = None) -> C
     if len(words) != expected:
         raise ConfigError(f"CONFIG: expected {expected} words, got {len(words)}", STATUS_MISSING)
     params = _named(table.params, words[:law_end], len(COMMON))
-    both = common | params
-    values = {word.name: dequantise(word, both[word.name], both) for word in (*COMMON, *table.params)}
-    _check_ranges(table, values)
+    values = _values_in_range(table, common | params)
     return Configuration(table, tuple(words), common, params, values, _rows(words, law_end), table_hash(table, words))
 
 
@@ -339,12 +337,16 @@ def _table_of(law_id: int, version: int, user: LawTable | None) -> LawTable:
     return table
 
 
-def _check_ranges(table: LawTable, values: Mapping[str, float]) -> None:
+def _values_in_range(table: LawTable, counts: Mapping[str, int]) -> dict[str, float]:
+    """Every word as a number; raises for the first outside its range, so before one whose LSB that word says."""
+    values: dict[str, float] = {}
     for index, word in enumerate((*COMMON, *table.params)):
         slack = 0.0 if word.q == 0 and not word.lsb else 1e-9 * (1.0 + abs(word.minimum))  # half an LSB of rounding
-        value = values[word.name]
+        value = dequantise(word, counts[word.name], counts)
         if not word.minimum - slack <= value <= word.maximum + slack:
             raise ConfigError(f"{word.name}: expected {range_text(word)}, got {value:g}", index=index)
+        values[word.name] = value
+    return values
 
 
 def _rows(words: Sequence[int], start: int) -> tuple[tuple[int, int, int, int], ...]:
