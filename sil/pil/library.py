@@ -180,7 +180,7 @@ def _key(compiler: Sequence[str], flags: Sequence[str]) -> str:
 
 
 def _environment(folder: str) -> dict[str, str]:
-    """ziglang keeps a cache of its own: it goes with the build, so that a home that cannot be written to is no matter."""
+    """ziglang's own cache goes with the build, so that a home that cannot be written to is no matter."""
     return {"ZIG_GLOBAL_CACHE_DIR": folder, "ZIG_LOCAL_CACHE_DIR": folder, **os.environ}
 
 

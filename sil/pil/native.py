@@ -6,68 +6,89 @@ cable's own link, which knows whose they are.
 
 from __future__ import annotations
 
+import argparse
+import contextlib
 import ctypes
 import os
 import signal
-import socket
 import sys
 from collections.abc import Callable
 
 from protocol.link import WRITE_TIMEOUT_S
 from protocol.links import Link, LinkError, open_link
-from sil.pil import child
+from sil.pil.hosting import (
+    EXIT_LINK,
+    EXIT_USAGE,
+    die_with,
+    fail,
+    say_listening,
+    settle_timers,
+    take_stdout,
+    wake_pipe,
+)
 from sil.pil.library import HostLink, LibraryError, load, source_hash
 
 STOPPED, INTERRUPTED, CLOSED, STUCK, FAILED = range(5)  # why host_serve() returned, as in firmware/hal/host/host.h
 LINK_IS_CLOSED = ctypes.c_size_t(-1).value
+MCL_CURRENT, MCL_FUTURE = 1, 2
 
 
 def main(argv: list[str] | None = None) -> int:
     """Exit codes: 0 stopped by the laboratory or by a signal, 2 bad arguments or no compiler, 3 link failure."""
-    options = child.parser("sil.pil.native", "The C firmware, compiled for this machine, as a board.").parse_args(argv)
-    stdout = child.settle(options)
+    options = _parser().parse_args(argv)
+    if options.parent:
+        die_with(options.parent)
+    stdout = take_stdout()
+    settle_timers()
+    if options.lock_memory:
+        _lock_memory()
     try:
         library = load()
     except LibraryError as error:
-        return child.fail(str(error), child.EXIT_USAGE)
+        return fail(str(error), EXIT_USAGE)
     try:
         link = open_link(options.link, listen=True)
     except LinkError as error:
-        return child.fail(str(error), child.EXIT_LINK)
-    with link, _StopSignal() as stop:
-        child.listening(stdout, link.url)
+        return fail(str(error), EXIT_LINK)
+    with link:
         trouble: list[str] = []
-        served = _host_link(link, stop, trouble)
+        served = _host_link(link, wake_pipe(signal.SIGTERM, signal.SIGINT), trouble)
+        say_listening(stdout, link.url)
         why = library.host_serve(ctypes.byref(served), options.once)
         if why in (STOPPED, INTERRUPTED) or (why == CLOSED and (options.once or served.had_session)):
             return 0
-        return child.fail(trouble[0] if trouble else _reason(options.link, why, served.error), child.EXIT_LINK)
+        return fail(trouble[0] if trouble else _reason(link.url, why, served.error), EXIT_LINK)
 
 
-class _StopSignal:
-    """SIGTERM and SIGINT become a byte to read from `fileno()`, which the main loop in C waits for, too."""
-
-    def __enter__(self) -> _StopSignal:
-        self._read, self._write = socket.socketpair()
-        self._write.setblocking(False)
-        signal.set_wakeup_fd(self._write.fileno(), warn_on_full_buffer=False)
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, lambda *_: None)
-        return self
-
-    def fileno(self) -> int:
-        return self._read.fileno()
-
-    def __exit__(self, *_: object) -> None:
-        signal.set_wakeup_fd(-1)
-        self._read.close()
-        self._write.close()
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m sil.pil.native",
+        description="The C firmware, compiled for this machine, as a board process.",
+        epilog="examples: --link serial:///dev/pts/7   --link udp://127.0.0.1:5005   --link udp://0.0.0.0:5005",
+    )
+    parser.add_argument(
+        "--link", required=True, metavar="URL", help="serial://PATH[?baud=N] or udp://HOST:PORT to listen on"
+    )
+    parser.add_argument(
+        "--once", action="store_true", help="exit after the first session (default: serve until stopped)"
+    )
+    parser.add_argument("--lock-memory", action="store_true", help="mlockall: no page of this process is swapped out")
+    parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
+    return parser
 
 
-def _host_link(link: Link, stop: _StopSignal, trouble: list[str]) -> HostLink:
+def _lock_memory() -> None:
+    """A refusal is no failure."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    with contextlib.suppress(AttributeError):
+        if libc.mlockall(MCL_CURRENT | MCL_FUTURE) != 0:
+            print(f"mlockall refused: {os.strerror(ctypes.get_errno())}", file=sys.stderr)
+
+
+def _host_link(link: Link, stop_fd: int, trouble: list[str]) -> HostLink:
     """The link as the library wants it; what a callback raises goes to `trouble`."""
     build = f"fw native {source_hash()[:8]}".encode()
-    made = HostLink(fd=link.fileno(), stop_fd=stop.fileno(), datagram=link.datagram, build=build)
+    made = HostLink(fd=link.fileno(), stop_fd=stop_fd, datagram=link.datagram, build=build)
     if link.datagram:
         made.read = HostLink.READ(_reader(link, trouble))
         made.write = HostLink.WRITE(_writer(link, trouble))
