@@ -1,0 +1,65 @@
+"""Builds of firmware/core for the tests of the laws: as the sources stand, mutated, or with a sanitizer."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+HERE = Path(__file__).parent
+CORE = HERE.parents[2] / "firmware" / "core"
+LAW_FILES = ["fixed", "reference", "kinematics", "gain", "gyroscopic", "rls", "pd", "mrac", "appc", "laws"]
+WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Werror"]
+
+
+def compiler() -> list[str]:
+    """This machine's C compiler, else the pip-installed one; fails where there is neither."""
+    for name in ("gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    return zig()
+
+
+def zig() -> list[str]:
+    """The pip-installed compiler."""
+    assert importlib.util.find_spec("ziglang"), "no C compiler: expected gcc, clang or ziglang (the dev extra)"
+    return [sys.executable, "-m", "ziglang", "cc"]
+
+
+def law_sources(core: Path = CORE) -> list[Path]:
+    """What the laws are made of."""
+    return [core / f"{name}.c" for name in LAW_FILES]
+
+
+def build(out: Path, extra: Sequence[Path], options: Sequence[str], core: Path = CORE, cc: Sequence[str] = ()) -> Path:
+    """`out` from the laws' sources in `core` and the files `extra`; raises with the compiler's words."""
+    command = [*(cc or compiler()), "-std=c11", *WARNINGS, f"-I{core}", f"-I{HERE}", *options]
+    command += [*map(str, law_sources(core)), *map(str, extra), "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
+    return out
+
+
+def program(directory: Path, options: Sequence[str] = ("-O2",), core: Path = CORE, cc: Sequence[str] = ()) -> Path:
+    """program.c with the laws."""
+    directory.mkdir(parents=True, exist_ok=True)
+    return build(directory / "program", [HERE / "episode.c", HERE / "program.c"], options, core, cc)
+
+
+def sanitized() -> list[str]:
+    """Options of a build that ends at the first undefined behaviour or, but for zig, access out of bounds."""
+    checks = "undefined" if "ziglang" in compiler() else "undefined,address"
+    return ["-g", "-O1", f"-fsanitize={checks}", "-fno-sanitize-recover=all"]
+
+
+def mutated(directory: Path, file: str, before: str, after: str) -> Path:
+    """A copy of firmware/core in which `before`, which stands once in that file, became `after`."""
+    core = directory / "core"
+    shutil.copytree(CORE, core)
+    text = (core / file).read_text()
+    assert text.count(before) == 1, f"{file}: expected {before!r} once, found {text.count(before)}"
+    (core / file).write_text(text.replace(before, after))
+    return core
