@@ -13,8 +13,9 @@ from typing import Literal, NamedTuple
 from protocol import codec, frames
 from protocol.channel import wire_time_ns
 from protocol.config import MAX_WORDS
-from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
+from protocol.law_tables import LAWS, TELEMETRY_COMMON, ConfigError, refusal
 from sil import scenario_law as laws
+from sil.boards import FIRMWARE, WITHOUT_TIMER
 from sil.configure import Orders, orders
 from sil.scenario import Scenario, load_scenario
 from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
@@ -56,12 +57,31 @@ def check(scenario: Scenario) -> list[Finding]:
     if scenario.board == "none":
         checks.insert(0, _schedule)
     else:
-        checks = [_law, _sensors, _clock, _deadline, _lateness_limit, *checks, _manoeuvre]
+        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, *checks, _manoeuvre]
     found = [finding for each in checks for finding in each(scenario)]
     return sorted(found, key=lambda finding: finding.severity != "error")
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
+
+
+def firmware_flies(scenario: Scenario) -> Iterator[Finding]:
+    """A board that runs the C firmware has the product's laws in fixed point; an emulated one steps by SAMPLE only."""
+    board, url = scenario.board, scenario.link.url
+    if board not in FIRMWARE:
+        return
+    if laws.is_user_law(scenario.law.name):
+        in_c = ", ".join(sorted({each.name for each in LAWS.values()}))
+        expected = f"{in_c} for board {board}, the laws in C (board process flies yours)"
+        yield _error(scenario, "law.name", expected, shown(scenario.law.name))
+    elif scenario.law.form != "fixed":
+        expected = f"fixed for board {board}, the firmware's arithmetic (board process has both)"
+        yield _error(scenario, "law.form", expected, scenario.law.form)
+    if url == "inproc" or url.startswith("serial:"):
+        yield _error(scenario, "link.url", f"pty or udp for board {board}, a process of this machine", shown(url))
+    if board in WITHOUT_TIMER and scenario.clock.mode != "lockstep":
+        expected = f"lockstep for board {board}, which has no timer of its own (board native has one)"
+        yield _error(scenario, "clock", expected, scenario.clock.mode)
 
 
 def _law(scenario: Scenario) -> Iterator[Finding]:

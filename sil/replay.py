@@ -22,6 +22,7 @@ from protocol.law_tables import COMMON, ROW_WORDS, dequantise
 from protocol.links import LinkError
 from protocol.port import Port
 from sil.boards import BoardOrder, plug_in
+from sil.checks import firmware_flies
 from sil.configure import Orders
 from sil.rig import DEAD_AFTER_S, HELLO_WITHIN_S, law_orders, user_law_spec
 from sil.runs import PacketRow, Run
@@ -63,11 +64,14 @@ class Report:
 def replay(
     run: Run, sets: Iterable[str] = (), board: str = "inproc", progress: Callable[[int, int], None] | None = None
 ) -> Report:
-    """Replay `run` into a fresh board of kind `board` (inproc, process), with overrides `a.b=value` of its scenario.
+    """Replay `run` into a fresh board of kind `board`, a name in BOARDS, with overrides `a.b=value` of its scenario.
 
-    Raises UsageError (nothing to replay, bad override) and LinkFailure (the board fails or refuses).
+    Raises UsageError (nothing to replay, bad override, a law that is not on this board) and LinkFailure (the board
+    fails or refuses).
     """
-    scenario = recorded_scenario(run, sets)
+    scenario = recorded_scenario(run, sets, board)
+    for finding in firmware_flies(scenario):
+        raise UsageError(str(finding))
     made = law_orders(scenario)
     report = Report(law_file=_changed_law(run, scenario))
     for session in _sessions(run):
@@ -81,15 +85,16 @@ def replay(
     return report
 
 
-def recorded_scenario(run: Run, sets: Iterable[str] = ()) -> Scenario:
-    """The scenario that the log carries, with overrides; a user's own law is looked for where the run found it."""
+def recorded_scenario(run: Run, sets: Iterable[str] = (), board: str = "process") -> Scenario:
+    """The scenario that the log carries, with overrides, on this board; a user's own law is looked for where the run
+    found it."""
     if run.scenario.get("board") == "none" or not any(row.type == Type.SAMPLE for row in run.packets):
         raise UsageError(f"{run.path}: no board took part in this run: there is nothing to replay")
     if not any(row.type == Type.COMMAND for row in run.packets):
         raise UsageError(f"{run.path}: no COMMAND in this log: the board never answered, there is nothing to replay")
     law_file = run.summary.get("law_file") or ""
     directory = Path(law_file).parent if law_file else Path()
-    values = {**run.scenario, "clock": "lockstep", "link": "pty"}
+    values = {**run.scenario, "clock": "lockstep", "link": "pty", "board": board}
     return load_values(values, tuple(sets), where=str(run.path), directory=directory)
 
 

@@ -15,7 +15,7 @@ from protocol.links import LinkError
 from protocol.port import Port
 from sil.actuators import ACTUATORS
 from sil.answers import Answers
-from sil.boards import BoardHost, BoardOrder, plug_in
+from sil.boards import FIRMWARE, BoardHost, BoardOrder, plug_in
 from sil.clock import Clock, clock_rate_q16, new_clock
 from sil.commands import CommandWindow, Decides, ExecutionModel
 from sil.configure import Orders, orders, row_at
@@ -176,8 +176,9 @@ def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel)
 def board_and_link(scenario: Scenario, wired: bool = False) -> tuple[str, str]:
     """(kind in BOARDS, URL of the link that is used); ("none", "") without a board.
 
-    A serial port has a board on its other end already: nobody has to be launched. Link inproc is board inproc, and the
-    other way round. wired: somebody starts the board by hand, so it needs a link that can be found.
+    A serial port has a board on its other end already: nobody has to be launched. For the Python board, link inproc is
+    board inproc, and the other way round. wired: somebody starts the board by hand, so it needs a link that can be
+    found.
     """
     board, link = scenario.board, scenario.link.url
     if board == "none":
@@ -188,6 +189,8 @@ def board_and_link(scenario: Scenario, wired: bool = False) -> tuple[str, str]:
         raise UsageError(f"link: expected pty, udp://HOST:PORT or serial://PATH to a board of its own, got {link!r}")
     if wired or (board == "process" and link.startswith("serial:")):
         return "wired", link
+    if board in FIRMWARE:
+        return board, link
     return ("inproc", "inproc") if "inproc" in (board, link) else (board, link)
 
 

@@ -21,6 +21,7 @@ TELL_EVERY_S = 10.0
 READY_WITHIN_S = 300.0  # a law may take its time to compile on a slow machine; nobody compiles for longer
 RESTARTS = 3
 BUILD = "sil 0.1"
+OTHER_VERSION = "take both from the same version; the C firmware is built anew with `make firmware`"
 
 _T = TypeVar("_T")
 
@@ -77,12 +78,17 @@ class Session:
         if self.board.protocol_version != frames.PROTOCOL_VERSION:
             raise LinkFailure(
                 f"board {self.board.build!r}: expected protocol {frames.PROTOCOL_VERSION}, "
-                f"got {self.board.protocol_version}"
+                f"got {self.board.protocol_version}: {OTHER_VERSION}"
             )
         if self.board.layout_hash != frames.LAYOUT_HASH:
             raise LinkFailure(
                 f"board {self.board.build!r}: expected layout {frames.LAYOUT_HASH:08x}, "
-                f"got {self.board.layout_hash:08x}: built from other frame layouts"
+                f"got {self.board.layout_hash:08x}, built from other frame layouts: {OTHER_VERSION}"
+            )
+        if self._hello.clock_rate_q16 and not self.board.flags & frames.HELLO_OWN_TIMER:
+            raise LinkFailure(
+                f"board {self.board.build!r}: expected one with its own timer for a paced clock, got one without: "
+                "use --clock lockstep"
             )
 
     def _is_echo(self, packet: Packet) -> Hello | None:

@@ -30,6 +30,9 @@ CLOCKS = (
 BOARDS = (
     ("process", "the controller in a process of its own"),
     ("inproc", "the controller in this process"),
+    ("native", "the C firmware, compiled for this machine"),
+    ("cortex-m", "the C firmware on an emulated Cortex-M"),
+    ("qemu", "the same image in QEMU"),
     ("none", "no controller"),
 )
 LINKS = (

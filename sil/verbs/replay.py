@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from sil.replay import Report
     from sil.runs import Run
 
-REPLAY_BOARDS = ("inproc", "process")
+REPLAY_BOARDS = ("inproc", "process", "native", "cortex-m", "qemu")
 
 
 def replay(
@@ -24,7 +24,7 @@ def replay(
         typer.Option(
             "--board",
             metavar="BOARD",
-            help="inproc or process: where the fresh board runs.",
+            help="The fresh board: inproc, process, or the firmware in native, cortex-m, qemu.",
             rich_help_panel=KEYS_PANEL,
             autocompletion=lambda incomplete: [each for each in REPLAY_BOARDS if each.startswith(incomplete)],
         ),
@@ -41,7 +41,7 @@ def replay(
     Exit codes: 0 identical, 1 an answer differs, 2 no such run, no board in it, or a bad override, 3 the board fails,
     130 interrupted.
 
-    Examples: sil replay runs/mrac-rs232-001 | sil replay runs/mrac-rs232-001 --board process --junit replay.xml |
+    Examples: sil replay runs/mrac-rs232-001 | sil replay runs/mrac-rs232-001 --board cortex-m --junit replay.xml |
     sil replay runs/mrac-rs232-001 --set law.params.c2_pole=0.7
     """
     from sil.replay import replay as replay_run

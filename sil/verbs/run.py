@@ -53,7 +53,8 @@ def run(
         typer.Option(
             "--board",
             metavar="BOARD",
-            help="process, inproc, none, or serial://PATH, udp://HOST:PORT of one that already runs.",
+            help="process, inproc, none; the C firmware: native, cortex-m, qemu; serial://PATH, udp://HOST:PORT: one "
+            "that already runs.",
             rich_help_panel=KEYS_PANEL,
             autocompletion=completion.boards,
         ),
@@ -79,7 +80,7 @@ def run(
     timing, 130 interrupted.
 
     Examples: sil run mrac-rs232 | sil run mrac-rs232 --clock scaled:20 --junit results.xml |
-    sil run appc-udp --set sensors.attitude.noise_deg=0.02 --out noisy |
+    sil run appc-udp --set sensors.attitude.noise_deg=0.02 --out noisy | sil run mrac-rs232 --board cortex-m |
     sil run pd-root-locus --clock realtime --priority 50 --cpus 0,1
     """
 

@@ -259,7 +259,7 @@ def test_bad_input_is_one_clear_line(cli, arguments, code, says):
 @pytest.mark.parametrize("board", ["none", "wired", "serial:///dev/ttyUSB0"])
 def test_replay_goes_into_a_fresh_board(cli, recorded, board):
     out, err = cli("replay", str(recorded(*SHORT)), "--board", board, code=2)
-    assert (out, err) == ("", f"--board: expected one of inproc, process, got '{board}'\n")
+    assert (out, err) == ("", f"--board: expected one of inproc, process, native, cortex-m, qemu, got '{board}'\n")
 
 
 def test_an_out_directory_that_is_not_empty_is_refused(cli):
