@@ -115,7 +115,7 @@ def _fly(
     try:
         rig = outcome.rig = assemble(scenario, recorder, folder / "board.log", watch.note, wired)
     except BaseException as error:
-        _discard(folder, made, recorder, keep_last_words=not isinstance(error, KeyboardInterrupt))
+        _discard(folder, made, recorder, keep_last_words=not isinstance(error, KeyboardInterrupt | UsageError))
         raise
     stop.hold()
     watch.plugged(scenario, rig)

@@ -203,7 +203,9 @@ class Machine:
     def _fault(self, error: int) -> None:
         """Say what happened and where; the image's own handler has the word, unless it is the one that fails."""
         what = self._bad_access or EXCEPTIONS.get(self._exception) or self.engine.reason(error)
-        self._tell(f"fault: {what}, at {self.image.place(self._registers[PC])}")
+        place = self.image.place
+        called = f", called from {place(self._registers[LR] & ~1)}" if "fetch" in what else ""
+        self._tell(f"fault: {what}, at {place(self._registers[PC])}{called}")
         if HARD_FAULT in self._active:
             self.asked = "lockup, a fault in the fault handler"
         else:
