@@ -100,7 +100,7 @@ class Board:
             return
         if hello.nonce != self._nonce:
             self._forget()
-            self._port.reset()
+            self._port.reset(forget=False)
             self._nonce = hello.nonce
             self._clock_rate_q16 = hello.clock_rate_q16
             self.stopped = False

@@ -134,15 +134,18 @@ class Port:
             self._gaps += ahead
         self._expect[which] = (sequence + 1) & 0xFFFF
 
-    def reset(self) -> None:
-        """A new session: deterministic numbers begin at 0 both ways, queued frames are forgotten, counters stay.
+    def reset(self, forget: bool = True) -> None:
+        """A new session: deterministic numbers begin at 0 both ways, counters stay.
 
-        Housekeeping counts on; the next number of the other end is taken as it comes. A candidate that has begun is
-        left alone: if it is of the old session, the zero before the next frame ends it.
+        forget: queued frames are of the old session (the lab's end, once the echo is there; behind a HELLO, on the
+        board's end, they are of the new one). Housekeeping counts on; the next number of the other end is taken as it
+        comes. A candidate that has begun is left alone: if it is of the old session, the zero before the next frame
+        ends it.
         """
         self._send_next[0] = 0
         self._expect = [0, None]
-        self._ready.clear()
+        if forget:
+            self._ready.clear()
 
     @property
     def counters(self) -> PortCounters:

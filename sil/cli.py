@@ -15,7 +15,7 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import bench, compare, completion, doctor, ladder, replay, report, run, scenario, sweep
+from sil.verbs import bench, board_test, compare, completion, doctor, ladder, replay, report, run, scenario, sweep
 from sil.verbs.manual import exit_codes, page_of
 
 app = typer.Typer(
@@ -62,7 +62,7 @@ VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, compare.compare, report.export, report.diff),
     "Study": (ladder.ladder, sweep.sweep, bench.bench),
-    "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor),
+    "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }
 for _panel, _verbs in VERBS.items():
     for _verb in _verbs:

@@ -60,7 +60,7 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
     if url.startswith("serial:"):
         path, _ = parse_url(url)
         device = devices.find(order.around, path, order.status)
-        for finding in _device(order, path, device):
+        for finding in examine_device(order, path, device):
             yield finding
             if finding.status == PROBLEM:
                 return
@@ -83,7 +83,7 @@ def examine_link(order: Examination, tell: Tell) -> Generator[Finding]:
         yield try_bauds(path, device, tell)
 
 
-def _device(order: Examination, path: str, device: Device | None) -> Generator[Finding]:
+def examine_device(order: Examination, path: str, device: Device | None) -> Generator[Finding]:
     """What is known without opening it; the caller stops at the first problem."""
     around = order.around
     yield bounded("device", lambda: devices.presence(around, path, device), LIMIT_S)

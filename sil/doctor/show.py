@@ -10,7 +10,7 @@ from typing import Any
 
 from sil.doctor.findings import NOTE, OK, PROBLEM, Finding
 
-COLOURS = {OK: "green", NOTE: "yellow", PROBLEM: "bold red"}
+COLOURS = {OK: "green", NOTE: "yellow", PROBLEM: "bold red", "pass": "green", "fail": "bold red", "skipped": "yellow"}
 STATUS_COLUMN, NAME_COLUMN = 9, 14
 STEP = 3  # by which the second piece of a folded line is indented
 WIDE, NARROW_INDENT = 98, " " * 4
@@ -21,11 +21,15 @@ PLAIN_EVERY_S = 5.0
 
 
 class Page:
-    """Writes findings on stdout as they come. Commands and raw bytes are never folded, so that they can be copied."""
+    """Writes findings on stdout as they come. Commands and raw bytes are never folded, so that they can be copied.
 
-    def __init__(self) -> None:
+    name_column: how wide the names of the checks are.
+    """
+
+    def __init__(self, name_column: int = NAME_COLUMN) -> None:
         from rich.console import Console
 
+        self._name_column = name_column
         self._console = Console(highlight=False, soft_wrap=True)
         self._encoding = self._console.encoding
         self._arrow = self._writable("→ ")
@@ -37,10 +41,10 @@ class Page:
 
         finding = Finding(*(self._writable(value) for value in finding))
         colour = COLOURS[finding.status]
-        indent = " " * (STATUS_COLUMN + NAME_COLUMN)
+        indent = " " * (STATUS_COLUMN + self._name_column)
         first, *more = self._folded(finding.found, 0) or [""]
         head = Text.assemble(
-            (f"{finding.status:<{STATUS_COLUMN}}", colour), (f"{finding.check:<{NAME_COLUMN}}", "bold")
+            (f"{finding.status:<{STATUS_COLUMN}}", colour), (f"{finding.check:<{self._name_column}}", "bold")
         )
         self._print(head.append(first))
         for piece in more:
@@ -55,6 +59,12 @@ class Page:
         for command in finding.commands:
             fits = not self._width or len(indent) + len(command) + 2 <= self._width
             self._print(Text.assemble(indent if fits else NARROW_INDENT, ("$ ", "dim"), (command, "cyan")))
+
+    def heading(self, text: str, style: str = "bold", rest: str = "") -> None:
+        """A line that sets apart what follows."""
+        from rich.text import Text
+
+        self._print(Text.assemble("\n", (self._writable(text), style), self._writable(rest)))
 
     def summary(self, findings: Iterable[Finding], subject: str) -> None:
         """The last line: how many of each."""
@@ -76,7 +86,7 @@ class Page:
 
     def _folded(self, text: str, step: int) -> list[str]:
         """`text` in pieces that fit, indented by `step` more; whole where the output is no terminal."""
-        room = self._width - STATUS_COLUMN - NAME_COLUMN - step
+        room = self._width - STATUS_COLUMN - self._name_column - step
         if room < 20:
             return [text] if text else []
         return textwrap.wrap(text, room, break_on_hyphens=False)
@@ -86,16 +96,20 @@ class Page:
 
 
 class Progress:
-    """What is going on, on stderr: a line that is replaced on a terminal, a line every five seconds elsewhere."""
+    """What is going on, on stderr: a line that is replaced on a terminal, a line every five seconds elsewhere.
 
-    def __init__(self) -> None:
+    quiet_s: nothing is said of what takes less.
+    """
+
+    def __init__(self, quiet_s: float = QUIET_S) -> None:
+        self._quiet_s = quiet_s
         self._began = self._said = time.monotonic()
         self._status: Any = None
 
     def tell(self, text: str) -> None:
         """Say it, if this is taking a while. Cheap: called after every round trip."""
         now = time.monotonic()
-        if now - self._began < QUIET_S:
+        if now - self._began < self._quiet_s:
             return
         if not sys.stderr.isatty():
             if now - self._said >= PLAIN_EVERY_S:

@@ -114,10 +114,10 @@ def _share_of_the_wire(talk: Talk, baud: int | None, median_us: float) -> tuple[
     return what, f"{said}; the rest is {max(0.0, median_us - wire_us) / 1000:.2f} ms"
 
 
-def histogram(times_us: np.ndarray) -> tuple[list[int], list[float]]:
+def histogram(times_us: np.ndarray, bins: int = BINS) -> tuple[list[int], list[float]]:
     """(counts, edges) over the whole range, the bins growing by the same ratio; times_us: (n,), n > 0, all > 0."""
     low, high = float(times_us.min()), float(times_us.max())
-    edges = np.geomspace(low, max(high, low * 1.01), BINS + 1)
+    edges = np.geomspace(low, max(high, low * 1.01), bins + 1)
     edges[0], edges[-1] = low, max(high, edges[-1])
     counts, _ = np.histogram(times_us, edges)
     return [int(count) for count in counts], [float(edge) for edge in edges]

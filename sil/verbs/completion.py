@@ -35,6 +35,19 @@ BOARDS = (
     ("qemu", "the same image in QEMU"),
     ("none", "no controller"),
 )
+CHECK_GROUPS = (
+    ("handshake", "HELLO, nonce, numbers, framing"),
+    ("states", "every event in every state"),
+    ("config", "parts, READY"),
+    ("receiver", "refused packets and garbage"),
+    ("ticks", "the timing contract"),
+    ("numbers", "flights, bit for bit"),
+    ("latency", "SAMPLE to COMMAND"),
+    ("timer", "the board's own, and its clock"),
+    ("baud", "at which rates it answers"),
+    ("reset", "what it does at boot"),
+    ("end", "nothing unasked, no session left"),
+)
 LINKS = (
     ("pty", "pseudo-terminal, a serial line of this machine"),
     ("udp", "UDP on this machine"),
@@ -69,6 +82,17 @@ def clocks(incomplete: str) -> list[Offer]:
 
 def boards(incomplete: str) -> list[Offer]:
     return _fitting([*BOARDS, *_devices()], incomplete)
+
+
+def testable_boards(incomplete: str) -> list[Offer]:
+    """What `sil board-test` takes."""
+    started = [offer for offer in BOARDS if offer[0] not in ("inproc", "none")]
+    return _fitting([*started, *_devices(), ("udp://127.0.0.1:5005", "the board at this address")], incomplete)
+
+
+def check_groups(incomplete: str) -> list[Offer]:
+    """Groups of checks of `sil board-test`."""
+    return _fitting(CHECK_GROUPS, incomplete)
 
 
 def rungs(incomplete: str) -> list[Offer]:

@@ -10,7 +10,8 @@ from benches import BoardBench, FakeHal, commands, events_of, make_sample, telem
 from firmware_sim.board import Board
 from firmware_sim.controllers.compiled import CompiledLaw
 from firmware_sim.flight import EVENTS_PER_ANSWER, Flight
-from protocol import events, frames
+from protocol import config, events, frames
+from protocol.frames import Hello
 from protocol.law_tables import TELEMETRY_COMMON
 
 LOST, OVERRUNS, DROPPED = (
@@ -350,3 +351,12 @@ def test_a_law_that_supports_one_delay_refuses_others():
     board.lab.reset()
     (ready,) = board.configure()
     assert ready.status == frames.READY_LAW_REFUSES
+
+
+def test_what_comes_behind_a_hello_in_the_same_read_is_of_the_new_session(bench):
+    """A burst of HELLO and what follows may arrive in one read: nothing of it is forgotten with the old session."""
+    board = bench()
+    board.sample(0)
+    hello = Hello(1, frames.ROLE_LAB, 0, frames.LAYOUT_HASH, 99, 0, "test")
+    answers = board.send(hello, *config.split(board.words), make_sample(0))
+    assert [type(frame).__name__ for frame in answers][:3] == ["Hello", "Ready", "Command"]
