@@ -86,6 +86,7 @@ static void keep(stream_decoder *d, uint8_t byte) {
     } else if (d->kept == ENCODED_MAX) {
         d->counters.too_long++;
         d->counters.discarded_bytes += ENCODED_MAX + 1;
+        d->kept = 0;
         d->discarding = true;
     } else {
         d->pending[d->kept++] = byte;

@@ -23,7 +23,6 @@ from pathlib import Path
 
 FIRMWARE = Path(__file__).resolve().parents[2] / "firmware"
 FOLDERS = ("core", "core/generated", "hal/host")
-WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
 FLAGS = ("-O2", "-std=c11", "-fwrapv", "-fPIC")
 # Its functions call each other, whatever else in the process has the same names.
 SHARED = ("-shared", "-Wl,-Bsymbolic")
@@ -72,22 +71,22 @@ def library() -> Path:
     """The file of the library; compiled when this cache does not have it. Raises LibraryError."""
     failures = []
     for compiler in compilers():
-        name = f"firmware-{_key(compiler, FLAGS + SHARED)}.so"
+        name = f"firmware-{_key(compiler)}.so"
         path = cache_directory() / name
         if path.exists():
             return path
         try:
-            return build(path, compiler)
+            return build(path, compiler, [*FLAGS, *SHARED, *c_files()])
         except LibraryError as error:
             failures.append(str(error))
     raise LibraryError(failures[0] if failures else f"native: no C compiler: {REMEDY}")
 
 
-def build(path: Path, compiler: Sequence[str], flags: Sequence[str] = FLAGS + SHARED) -> Path:
-    """Compile all sources into `path`, which is there whole or not at all. Raises LibraryError with the first error."""
+def build(path: Path, compiler: Sequence[str], arguments: Sequence[str]) -> Path:
+    """Run the compiler for `path`, which is there whole or not at all. Raises LibraryError with its first error."""
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=".build-") as folder:
         made = Path(folder) / path.name
-        command = [*compiler, *flags, *map(str, c_files()), "-o", str(made)]
+        command = [*compiler, *arguments, "-o", str(made)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=BUILD_S, env=_environment(folder))
         except (OSError, subprocess.TimeoutExpired) as error:
@@ -111,14 +110,14 @@ def compilers() -> Iterator[tuple[str, ...]]:
         yield (sys.executable, "-m", "ziglang", "cc")
 
 
-def c_files() -> list[Path]:
-    """The C files of the library. Raises LibraryError when the installation has none."""
-    return [path for path in sources() if path.suffix == ".c"]
+def c_files(folders: Sequence[str] = FOLDERS) -> list[str]:
+    """The C files of these folders. Raises LibraryError when the installation has none."""
+    return [str(path) for path in sources(folders) if path.suffix == ".c"]
 
 
-def sources() -> list[Path]:
-    """Everything the library is made of, in a fixed order."""
-    found = [path for folder in FOLDERS for path in sorted((FIRMWARE / folder).glob("*.[ch]"))]
+def sources(folders: Sequence[str] = FOLDERS) -> list[Path]:
+    """Everything the library is made of, in a fixed order. Raises LibraryError when the installation has nothing."""
+    found = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.[ch]"))]
     if not found:
         raise LibraryError(f"native: the firmware's sources are not in {FIRMWARE}: install attitude-sil anew")
     return found
@@ -164,7 +163,7 @@ def _usable(directory: Path) -> bool:
         return False
 
 
-def _key(compiler: Sequence[str], flags: Sequence[str]) -> str:
+def _key(compiler: Sequence[str]) -> str:
     """Sources, arguments, and which compiler: by size and time of its file, ziglang by its version."""
     digest = hashlib.sha256(source_hash().encode())
     if "ziglang" in compiler:
@@ -175,7 +174,7 @@ def _key(compiler: Sequence[str], flags: Sequence[str]) -> str:
             identity = f"{status.st_size} {status.st_mtime_ns}"
         except OSError:
             identity = ""
-    digest.update("\0".join([*compiler, identity, *flags]).encode())
+    digest.update("\0".join([*compiler, identity, *FLAGS, *SHARED]).encode())
     return digest.hexdigest()[:16]
 
 
