@@ -3,6 +3,8 @@
 
 #include <stdbool.h>
 
+int64_t rounded_by(int64_t x, int32_t n) { return rounded(x, n); }
+
 int64_t div_trunc(int64_t a, int64_t b) {
     uint64_t n = (uint64_t)magnitude(a), d = (uint64_t)magnitude(b), quotient;
     if (b == 0) {

@@ -12,6 +12,7 @@
 
 #include <stdint.h>
 
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
 #define ONE_Q(n) (INT64_C(1) << (n)) /* 1 with n fractional bits */
 #define TWO_PI_Q28 INT64_C(1686629713)
 #define INV_TWO_PI_Q34 INT64_C(2734261102)
@@ -24,7 +25,7 @@ static inline int64_t sum64(int64_t a, int64_t b) { return (int64_t)((uint64_t)a
 static inline int64_t difference64(int64_t a, int64_t b) { return (int64_t)((uint64_t)a - (uint64_t)b); }
 static inline int64_t product64(int64_t a, int64_t b) { return (int64_t)((uint64_t)a * (uint64_t)b); }
 
-/* |x|; of -2^63 itself. */
+/* The absolute value of x; -2^63 stays what it is. */
 static inline int64_t magnitude(int64_t x) { return x < 0 ? difference64(0, x) : x; }
 
 static inline int64_t smaller(int64_t a, int64_t b) { return a < b ? a : b; }
@@ -48,16 +49,23 @@ static inline int32_t sat32(int64_t x) { return x < INT32_MIN ? INT32_MIN : (x >
 static inline int32_t add_sat(int64_t a, int64_t b) { return sat32(sum64(a, b)); }
 static inline int32_t sub_sat(int64_t a, int64_t b) { return sat32(difference64(a, b)); }
 
-/* x / 2^n, rounded to nearest, half up (arithmetic shift of x + 2^(n-1)); n <= 0: x * 2^-n. |n| <= 63. */
-static inline int64_t shift_round(int64_t x, int32_t n) {
+ALWAYS_INLINE int64_t rounded(int64_t x, int32_t n) {
     if (n > 0) {
         return sum64(x, (int64_t)(UINT64_C(1) << (n - 1))) >> n; /* of a negative number: arithmetic, in every compiler */
     }
     return (int64_t)((uint64_t)x << -n);
 }
 
+/* rounded(), out of line: for an n that only the running program knows it is long. */
+int64_t rounded_by(int64_t x, int32_t n);
+
+/* x / 2^n, rounded to nearest, half up (arithmetic shift of x + 2^(n-1)); n <= 0: x * 2^-n. |n| <= 63. */
+ALWAYS_INLINE int64_t shift_round(int64_t x, int32_t n) {
+    return __builtin_constant_p(n) ? rounded(x, n) : rounded_by(x, n);
+}
+
 /* a b / 2^n, rounded half up; the product must fit int64. */
-static inline int64_t mul_q(int64_t a, int64_t b, int32_t n) { return shift_round(product64(a, b), n); }
+ALWAYS_INLINE int64_t mul_q(int64_t a, int64_t b, int32_t n) { return shift_round(product64(a, b), n); }
 
 /* a b / 2^n for a 64-bit a and a 32-bit b, 1 <= n <= 62, the product up to 95 bits, the result in int64.
  * Rounded half up for n <= 32; beyond, the product is first cut (floor) at 2^32, then rounded. */

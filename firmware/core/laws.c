@@ -1,12 +1,13 @@
 /* The laws of this board: one line each. */
 #include "appc.h"
+#include "generated/law_tables.h"
 #include "mrac.h"
 #include "pd.h"
 
-static const law *const LAWS[] = {&PD_LAW, &MRAC_LAW, &APPC_LAW};
+static const law *const LAWS[LAW_TABLES_COUNT] = {&PD_LAW, &MRAC_LAW, &APPC_LAW};
 
 const law *law_find(uint16_t id, uint16_t version) {
-    for (size_t i = 0; i < sizeof LAWS / sizeof LAWS[0]; i++) {
+    for (size_t i = 0; i < LAW_TABLES_COUNT; i++) {
         if (LAWS[i]->id == id && LAWS[i]->version == version) {
             return LAWS[i];
         }

@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from sil.pil.library import compilers
+
 HERE = Path(__file__).parent
 CORE = HERE.parents[2] / "firmware" / "core"
-LAW_FILES = ["fixed", "reference", "kinematics", "gain", "gyroscopic", "rls", "pd", "mrac", "appc", "laws"]
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Werror"]
+LAW_FILES = ["fixed", "reference", "kinematics", "gain", "gyroscopic", "rls", "pd", "mrac", "appc", "laws"]
 
 
 def compiler() -> list[str]:
-    """This machine's C compiler, else the pip-installed one; fails where there is neither."""
-    for name in ("gcc", "clang"):
-        if shutil.which(name):
-            return [name]
-    return zig()
+    """What the host library is compiled with here."""
+    return [*next(compilers())]
 
 
 def zig() -> list[str]:
     """The pip-installed compiler."""
-    assert importlib.util.find_spec("ziglang"), "no C compiler: expected gcc, clang or ziglang (the dev extra)"
     return [sys.executable, "-m", "ziglang", "cc"]
 
 
@@ -34,19 +31,25 @@ def law_sources(core: Path = CORE) -> list[Path]:
     return [core / f"{name}.c" for name in LAW_FILES]
 
 
-def build(out: Path, extra: Sequence[Path], options: Sequence[str], core: Path = CORE, cc: Sequence[str] = ()) -> Path:
-    """`out` from the laws' sources in `core` and the files `extra`; raises with the compiler's words."""
-    command = [*(cc or compiler()), "-std=c11", *WARNINGS, f"-I{core}", f"-I{HERE}", *options]
-    command += [*map(str, law_sources(core)), *map(str, extra), "-o", str(out)]
-    done = subprocess.run(command, capture_output=True, text=True)
+def build(
+    out: Path,
+    extra: Sequence[Path],
+    options: Sequence[str],
+    core: Path = CORE,
+    laws: bool = True,
+) -> Path:
+    """`out` from the laws' sources in `core`, if `laws`, and the files `extra`; fails with the compiler's words."""
+    command = [*compiler(), "-std=c11", *WARNINGS, f"-I{core}", f"-I{HERE}", *options]
+    command += [str(path) for path in (*(law_sources(core) if laws else ()), *extra)]
+    done = subprocess.run([*command, "-o", str(out)], capture_output=True, text=True)
     assert done.returncode == 0, f"{' '.join(command)}\n{done.stderr}"
     return out
 
 
-def program(directory: Path, options: Sequence[str] = ("-O2",), core: Path = CORE, cc: Sequence[str] = ()) -> Path:
+def program(directory: Path, options: Sequence[str] = ("-O2",), core: Path = CORE) -> Path:
     """program.c with the laws."""
     directory.mkdir(parents=True, exist_ok=True)
-    return build(directory / "program", [HERE / "episode.c", HERE / "program.c"], options, core, cc)
+    return build(directory / "program", [HERE / "episode.c", HERE / "program.c"], options, core)
 
 
 def sanitized() -> list[str]:

@@ -1,4 +1,4 @@
-/* What the tests record of a law after each step: this, then the raw bytes of reference and law. */
+/* One episode of a law, and what the tests record after each of its steps: this, then the raw bytes of reference and law. */
 #ifndef TESTS_EPISODE_H
 #define TESTS_EPISODE_H
 
@@ -13,8 +13,24 @@ typedef struct {
     int32_t telemetry_words;
 } step_record;
 
+/* What is under test: functions of this program, or those of an image, by address. */
+typedef struct {
+    const law *(*law_find)(uint16_t id, uint16_t version);
+    void (*reference_init)(reference *self, const int32_t *common);
+    bool (*reference_advance)(reference *self, const law_input *in);
+    void (*reference_words)(const reference *self, int32_t words[6]);
+} laws_under_test;
+
+typedef struct {
+    laws_under_test laws;
+    uint32_t id, version;
+    const int32_t *common, *params;
+    const law_input *in;
+    uint32_t steps;
+    uint8_t *trace;
+} episode;
+
 /* Bytes written to trace; 0 if the law refused its parameters or is unknown. */
-size_t run_episode(uint32_t id, uint32_t version, const int32_t *common, const int32_t *params, const law_input *in,
-                   size_t steps, uint8_t *trace);
+uint32_t run_episode(const episode *e);
 
 #endif

@@ -27,7 +27,9 @@ int main(void) {
         if (fread(config, sizeof *config, words, stdin) != words || fread(in, sizeof *in, steps, stdin) != steps) {
             return 2;
         }
-        uint32_t size = (uint32_t)run_episode(head[0], head[1], config, config + head[2], in, steps, trace);
+        episode e = {{law_find, reference_init, reference_advance, reference_words}, head[0], head[1],
+                     config, config + head[2], in, head[4], trace};
+        uint32_t size = run_episode(&e);
         fwrite(&size, sizeof size, 1, stdout);
         fwrite(trace, 1, size, stdout);
         free(config);

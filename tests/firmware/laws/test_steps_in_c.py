@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from pathlib import Path
 
 import c_build
@@ -12,6 +13,7 @@ from episodes import STEPS, Episode, episodes
 
 from firmware_sim.controllers import LAWS, LawRefuses, inputs, new_law
 from protocol.law_tables import COMMON, config_words, law_by_name, parse_configuration
+from sil.pil import library
 
 EPISODES = 500
 UNSATURATED = 0.7  # at least this share of the steps; random inputs alone would keep every output at its limit
@@ -74,3 +76,35 @@ def test_mrac_refuses_what_python_refuses(tmp_path: Path) -> None:
     traces = run(c_build.program(tmp_path), asked)
     assert [trace == b"" for trace in traces] == refused
     assert set(refused) == {True, False}
+
+
+LAWS_UNDER_TEST = ("law_find", "reference_init", "reference_advance", "reference_words")
+
+
+class Call(ctypes.Structure):
+    """`episode` of episode.h."""
+
+    _fields_ = [
+        *((name, ctypes.c_void_p) for name in LAWS_UNDER_TEST),
+        ("id", ctypes.c_uint32),
+        ("version", ctypes.c_uint32),
+        *((name, ctypes.c_void_p) for name in ("common", "params", "inp")),
+        ("steps", ctypes.c_uint32),
+        ("trace", ctypes.c_void_p),
+    ]
+
+
+def test_the_library_that_flies_has_the_same_laws(tmp_path: Path) -> None:
+    """The functions of the very library that board `native` loads, called by address."""
+    flown = library.load()
+    made = c_build.build(tmp_path / "episode.so", [c_build.HERE / "episode.c"], ["-shared", "-fPIC"], laws=False)
+    functions = [ctypes.cast(getattr(flown, name), ctypes.c_void_p).value for name in LAWS_UNDER_TEST]
+    for law in LAWS:
+        recorded, traces = list(episodes(law, 24)), []
+        for e in recorded:
+            table, trace = law_by_name(law), ctypes.create_string_buffer(STEPS * 2048)
+            places = [array.ctypes.data for array in (e.common, e.params, e.inp)]
+            call = Call(*functions, table.law_id, table.version, *places, STEPS, ctypes.addressof(trace))
+            size = ctypes.CDLL(str(made)).run_episode(ctypes.byref(call))
+            traces.append(trace.raw[:size])
+        assert compare(recorded, traces)[:2] == (24 * STEPS, 0)
