@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN     = $(VENV)/bin
 JOBS   ?= 2
 
-.PHONY: check lint types imports test golden bench clean
+.PHONY: check lint types imports test golden firmware bench clean
 
 check: lint types imports test
 
@@ -34,6 +34,11 @@ test: $(VENV)/.installed tests/e2e/node_modules/.installed
 golden: $(VENV)/.installed
 	$(BIN)/python -m tools.make_vectors
 	$(BIN)/python -m tools.spec_tables --write
+
+# The C side of what Python says, and the images that ship: after an edit of firmware/ or of a table it is made from.
+firmware: $(VENV)/.installed
+	$(BIN)/python -m tools.firmware_headers --write
+	$(BIN)/python -m tools.firmware_image --write
 
 bench: $(VENV)/.installed
 	$(BIN)/sil bench

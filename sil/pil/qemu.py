@@ -1,113 +1,108 @@
-"""The board process of QEMU: python -m sil.pil.qemu --link serial:///dev/pts/N [--parent PID]. The mps2-an386 image.
+"""The board in QEMU: python -m sil.pil.qemu --link serial:///dev/pts/N [--parent PID] [--chip NAME] [--image FILE].
 
-It starts QEMU on the laboratory's pty, tells on standard error what QEMU tells of resets, and ends, with QEMU, when the
-pty hangs up or its parent is gone.
+It starts QEMU on the laboratory's pty and ends, with QEMU, when the pty hangs up. Standard error says what happens to
+the firmware: faults, a watchdog that bit. SIGUSR1 is the reset button, and SIGTERM pulls the plug.
 """
 
 from __future__ import annotations
 
 import argparse
-import ctypes
-import json
 import os
 import select
 import signal
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from protocol.link import LinkError
 from protocol.links.serial import parse_url
-from sil.pil.qemu_machine import PR_SET_PDEATHSIG, Qemu, QemuError
+from sil.pil.hosting import EXIT_LINK, EXIT_USAGE, die_with, fail, say_listening, take_stdout, wake_pipe
+from sil.pil.qemu_machine import Qemu, QemuError
 from sil.pil.qmp import QmpError
 
-MACHINE = "mps2-an386"
-IMAGES = Path(__file__).parents[2] / "firmware" / "images"
-EXIT_LINK = 3
+NAME = "qemu"
+MACHINES = {"mps2-an386": "mps2-an386", "stm32f405": "netduinoplus2"}  # chip: what QEMU calls a board with it
+IMAGES = Path(__file__).resolve().parents[2] / "firmware" / "images"
+REMEDY = "build it with `make firmware`"
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Exit codes: 0 the pty has hung up, 2 bad arguments, no image or no QEMU, 3 QEMU ended by itself."""
+    """Exit codes: 0 the pty has hung up, or told to end; 2 bad arguments, no image or no QEMU; 3 no such link, or QEMU
+    ended by itself."""
     options = _parser().parse_args(argv)
     if options.parent:
-        _die_with(options.parent)
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+        die_with(options.parent)
+    stdout = take_stdout()
+    image = options.image or IMAGES / f"{options.chip}.elf"
+    if not image.exists():
+        return fail(f"{NAME}: {image}: no such image: {REMEDY}", EXIT_USAGE)
+    wake = wake_pipe(signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
     try:
         path, _ = parse_url(options.link)
-        record = _boot_record_address()
         line = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)  # to see the hang-up; QEMU alone reads it
-        qemu = Qemu(IMAGES / f"{MACHINE}.elf", MACHINE, path)
-    except (LinkError, QemuError, OSError) as error:
-        return _fail(str(error), 2)
+        qemu = Qemu(image, MACHINES[options.chip], path)
+    except (LinkError, OSError) as error:
+        return fail(f"{NAME}: {error}", EXIT_LINK)
+    except QemuError as error:
+        return fail(f"{NAME}: {error}", EXIT_USAGE)
     try:
-        print(f"listening {options.link}", flush=True)
-        sys.stdout.close()
-        return _watch(qemu, line, record)
-    except KeyboardInterrupt:
-        return 0
+        say_listening(stdout, options.link)
+        return _watch(qemu, line, wake)
     finally:
         qemu.close()
 
 
-def _watch(qemu: Qemu, line: int, record: int) -> int:
-    """Until the pty hangs up, or QEMU ends."""
+def _watch(qemu: Qemu, line: int, wake: int) -> int:
+    """Until the pty hangs up, a signal says so, or QEMU ends."""
     poller = select.poll()
     poller.register(line, 0)  # a hang-up needs no asking
+    poller.register(wake, select.POLLIN)
     poller.register(qemu.qmp.fileno(), select.POLLIN)
     try:
         while True:
-            if any(fd == line for fd, _ in poller.poll()):
+            ready = [fd for fd, _ in poller.poll()]
+            if line in ready or (wake in ready and _plug_pulled(qemu, wake)):
                 return 0
             for event in qemu.qmp.take_events():
-                _tell(qemu, event, record)
+                _tell(qemu, event)
     except QmpError:
         code = qemu.process.wait()
         words = qemu.last_words()
-        return _fail(f"QEMU ended with {_describe(code)}{': ' if words else ''}{words}", EXIT_LINK)
+        return fail(f"{NAME}: it ended with {_describe(code)}{': ' if words else ''}{words}", EXIT_LINK)
 
 
-def _tell(qemu: Qemu, event: dict[str, Any], record: int) -> None:
-    """One line for each reset the firmware caused: by its watchdog, or by a fault."""
-    if event["event"] == "WATCHDOG":
-        print("the firmware hung and its watchdog bit", file=sys.stderr, flush=True)
-    if event["event"] == "RESET" and event["data"].get("guest"):
-        incident = qemu.boot_record(record).incident()
-        print(f"the firmware was reset{': ' if incident else ''}{incident}", file=sys.stderr, flush=True)
+def _plug_pulled(qemu: Qemu, wake: int) -> bool:
+    """Which signals have come: SIGUSR1 presses the reset button, any other ends this process."""
+    numbers = os.read(wake, 64)
+    if signal.SIGUSR1 in numbers:
+        qemu.qmp.run("system_reset")
+    return any(number != signal.SIGUSR1 for number in numbers)
 
 
-def _boot_record_address() -> int:
-    """From the manifest beside the image. Raises QemuError."""
-    try:
-        manifest = json.loads((IMAGES / "manifest.json").read_text(encoding="utf-8"))
-        return int(manifest[MACHINE]["symbols"]["boot_record"], 16)
-    except (OSError, ValueError, KeyError):
-        raise QemuError(
-            f"image {MACHINE}: firmware/images/manifest.json is missing or broken; renew with `make firmware`"
-        ) from None
+def _tell(qemu: Qemu, event: dict[str, Any]) -> None:
+    """One line for each reset, with what the firmware itself has kept of the incident."""
+    if event["event"] != "RESET":
+        return
+    incident = qemu.boot_record().incident() if event["data"].get("guest") else "the button was pressed (SIGUSR1)"
+    print(f"{NAME}: the firmware was reset: {incident}", file=sys.stderr, flush=True)
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="sil.pil.qemu", description="The firmware's mps2-an386 image in QEMU.")
+    parser = argparse.ArgumentParser(
+        prog="sil.pil.qemu",
+        description="The firmware's image in QEMU; its UART is the link. For lockstep: its time is not yours.",
+        epilog="examples: --link serial:///dev/pts/7   --link serial:///dev/pts/7 --chip stm32f405",
+    )
     parser.add_argument("--link", required=True, metavar="URL", help="serial:///dev/pts/N, the board's side of a pty")
+    parser.add_argument("--chip", choices=MACHINES, default="mps2-an386", help="default: %(default)s")
+    parser.add_argument("--image", type=Path, metavar="FILE", help="an image of your own; default: the one that ships")
+    parser.add_argument("--once", action="store_true", help="no difference: it ends with its link in any case")
     parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
-    parser.add_argument("--once", action="store_true", help="no difference: the link's end is the end in any case")
     return parser
-
-
-def _die_with(parent: int) -> None:
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() != parent:
-        sys.exit(0)
 
 
 def _describe(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
-
-
-def _fail(line: str, code: int) -> int:
-    print(line, file=sys.stderr)
-    return code
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """One QEMU with one image on one serial line, from start to a certain end: what the board process and the tests share.
 
-The laboratory holds the master of a pty and QEMU opens its other side as a serial port. So no byte is lost before anybody
-listens, and QEMU's end is a hang-up to the laboratory.
+The laboratory holds the master of a pty and QEMU opens its other side as a serial port. So no byte is lost before
+anybody listens, and QEMU's end is a hang-up to the laboratory.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ import subprocess
 from pathlib import Path
 from typing import NamedTuple
 
+from sil.pil.hosting import PR_SET_PDEATHSIG
 from sil.pil.qmp import Qmp, QmpError
 
 PROGRAM = "qemu-system-arm"
 REMEDY = f"{PROGRAM}: not found; Debian and Ubuntu: apt-get install --no-install-recommends qemu-system-arm"
-PR_SET_PDEATHSIG = 1
 BOOT_MAGIC = 0xB0A2D001
-EXCEPTIONS = {0: "", 1: "main() returned", 2: "NMI", 3: "fault"}
+EXCEPTIONS = {1: "main() returned", 2: "its watchdog bit (NMI)", 3: "fault"}
+VECTORS = 0x0  # of either machine, by address or by alias
 
 
 class QemuError(Exception):
@@ -29,7 +30,7 @@ class QemuError(Exception):
 
 
 class BootRecord(NamedTuple):
-    """firmware/hal/cortex-m/start.h: struct boot_record. All zero before the first boot."""
+    """firmware/hal/cortex-m/start.h: struct boot_record."""
 
     magic: int
     boots: int
@@ -38,9 +39,11 @@ class BootRecord(NamedTuple):
     status: int
 
     def incident(self) -> str:
-        """What happened last, for people; "" when nothing did."""
+        """What happened last, for people."""
+        if self.magic != BOOT_MAGIC or self.exception == 0:
+            return "nothing is known of the cause"
         what = EXCEPTIONS.get(self.exception, f"exception {self.exception}")
-        return f"{what} at 0x{self.pc:08x}, CFSR 0x{self.status:08x}" if what else ""
+        return f"{what} at 0x{self.pc:08x}, CFSR 0x{self.status:08x}"
 
 
 class Qemu:
@@ -71,9 +74,10 @@ class Qemu:
         shown = self.qmp.run("human-monitor-command", **{"command-line": f"xp /{count}wx 0x{address:x}"})
         return [int(text, 16) for line in shown.splitlines() for text in line.partition(":")[2].split()]
 
-    def boot_record(self, address: int) -> BootRecord:
-        """Why the firmware last started. address: of its symbol."""
-        return BootRecord(*self.words(address, len(BootRecord._fields)))
+    def boot_record(self) -> BootRecord:
+        """Why the firmware last started: it lies just above the stack, whose top is the first of the vectors."""
+        (stack_top,) = self.words(VECTORS, 1)
+        return BootRecord(*self.words(stack_top, len(BootRecord._fields)))
 
     def last_words(self) -> str:
         """The last line of its standard error that is no warning. Waits for its end."""

@@ -13,14 +13,29 @@ extern int main(void);
 extern uint32_t stack_bottom[];
 extern uint32_t data_start[], data_end[], data_image[], bss_start[], bss_end[];
 
-__attribute__((section(".noinit"), used)) struct boot_record boot_record;
+__attribute__((section(".noinit"), used)) volatile struct boot_record boot_record;
 
 static volatile int64_t milliseconds;
 static uint32_t counts_per_us;
 
+static void record(uint32_t exception, uint32_t pc, uint32_t status) {
+    boot_record.exception = exception;
+    boot_record.pc = pc;
+    boot_record.status = status;
+}
+
 static void count_boot(void) {
-    if (boot_record.magic != BOOT_MAGIC) boot_record = (struct boot_record){.magic = BOOT_MAGIC};
+    if (boot_record.magic != BOOT_MAGIC) {
+        boot_record.magic = BOOT_MAGIC;
+        boot_record.boots = 0u;
+        record(0u, 0u, 0u);
+    }
     boot_record.boots += 1u;
+}
+
+static _Noreturn void reset(void) {
+    barrier();
+    for (;;) SCB_AIRCR = AIRCR_KEY | AIRCR_SYSTEM_RESET;
 }
 
 static void paint_stack(void) {
@@ -40,23 +55,20 @@ _Noreturn void on_reset(void) {
     for (volatile uint32_t *word = bss_start; word < bss_end; word++) *word = 0u;
     count_boot();
     (void)main();
-    boot_record.exception = 1u;
-    for (;;) SCB_AIRCR = AIRCR_KEY | AIRCR_SYSTEM_RESET;
+    record(1u, 0u, 0u);
+    reset();
 }
 
 /* frame: what the core pushed, r0-r3 r12 lr pc xpsr; NULL where it may not have got that far. */
 __attribute__((used)) static void note(const uint32_t *frame) {
     uint32_t exception;
     __asm volatile("mrs %0, ipsr" : "=r"(exception));
-    boot_record.exception = exception;
-    boot_record.status = SCB_CFSR;
-    boot_record.pc = frame ? frame[6] : 0u;
+    record(exception, frame ? frame[6] : 0u, SCB_CFSR);
 }
 
 __attribute__((used)) static _Noreturn void note_and_reset(const uint32_t *frame) {
     note(frame);
-    barrier();
-    for (;;) SCB_AIRCR = AIRCR_KEY | AIRCR_SYSTEM_RESET;
+    reset();
 }
 
 /* A stack that has overflowed ends below RAM, where there is no frame and no room: begin it anew, nothing returns to it. */

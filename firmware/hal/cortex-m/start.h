@@ -8,8 +8,8 @@
 
 #define STACK_BYTES 2048u
 
-/* Why the board started, kept over a reset in memory that start-up leaves alone. Read it with a debugger, or in QEMU:
- * symbol boot_record, five words. boots counts from power-on. The other fields are those of the last incident, 0 before any:
+/* Why the board started, kept over a reset in memory that start-up leaves alone: five words just above the stack, for a
+ * debugger, and for QEMU. boots counts from power-on. The other fields are those of the last incident, 0 before any:
  * exception is its number (2 NMI: the watchdog is about to bite, or the crystal failed; 3 fault; others: an interrupt that
  * nobody expects; 1: main() returned), pc where it happened, status the CFSR (which says what kind of fault).
  */
@@ -20,7 +20,7 @@ struct boot_record {
     uint32_t pc;
     uint32_t status;
 };
-extern struct boot_record boot_record;
+extern volatile struct boot_record boot_record;
 
 typedef void (*vector)(void);
 extern const vector vectors[]; /* the chip's table; its first word is stack_top */
