@@ -42,10 +42,10 @@ def fly(folder: Path, law: str, board: str, *sets: str) -> str:
 @pytest.mark.parametrize("profile", ["A", "B"])
 @pytest.mark.parametrize("law", LAWS)
 def test_a_whole_manoeuvre_leaves_the_bytes_of_the_python_board(tmp_path: Path, law: str, profile: str) -> None:
-    python, firmware = (
-        fly(tmp_path / board, law, board, f"guidance.profile={profile}") for board in ("inproc", "cortex-m")
-    )
-    assert firmware == python
+    """On the emulated processor and, compiled for this machine, as the board native."""
+    boards = ("inproc", "cortex-m", "native")
+    python, firmware, native = (fly(tmp_path / board, law, board, f"guidance.profile={profile}") for board in boards)
+    assert firmware == native == python
 
 
 @pytest.mark.parametrize("link", ["pty", "udp"])
