@@ -15,7 +15,20 @@ import typer
 
 from sil import streams
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_USAGE, SilError
-from sil.verbs import bench, board_test, compare, completion, doctor, ladder, replay, report, run, scenario, sweep
+from sil.verbs import (
+    bench,
+    board_test,
+    compare,
+    completion,
+    doctor,
+    ladder,
+    pil_report,
+    replay,
+    report,
+    run,
+    scenario,
+    sweep,
+)
 from sil.verbs.manual import exit_codes, page_of
 
 app = typer.Typer(
@@ -61,7 +74,7 @@ def sil(
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, compare.compare, report.export, report.diff),
-    "Study": (ladder.ladder, sweep.sweep, bench.bench),
+    "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }
 for _panel, _verbs in VERBS.items():

@@ -50,6 +50,7 @@ class Machine:
         self.image, self._tell = image, tell
         self.engine = Engine()
         self.uart, self.watchdog, self.system = Uart(on_sent), Watchdog(), System(lambda: self.ask("software"))
+        self.permits = places_that_permit(image)
         self.executing = False  # from bytes that come until the firmware waits: what a hang is measured by
         self.asked = ""  # why the machine is to reset, until it does
         self._registers: list[int] = [0] * len(Engine.REGISTERS)
@@ -70,7 +71,7 @@ class Machine:
             engine.map_registers(*page)
         engine.on_exception(self._on_exception)
         engine.on_bad_access(self._on_bad_access)
-        for address in places_that_permit(image):
+        for address in self.permits:
             engine.on_code(address, self._on_permit)
 
     # -- for whoever has plugged it in -------------------------------------------------------------------------------
@@ -98,6 +99,10 @@ class Machine:
     def reset_if_asked(self) -> bytes:
         """For an idle machine: the reset that was asked for, and what the firmware says at its start."""
         return self._until_idle() if self.asked else b""
+
+    def link_register(self) -> int:
+        """Where the function under way returns to; for who hooks its first instruction."""
+        return self.engine.read_registers()[LR]
 
     def close(self) -> None:
         self.engine.close()
@@ -133,12 +138,17 @@ class Machine:
             elif not self._wakes():
                 return
 
+    @property
+    def interrupt_waits(self) -> bool:
+        """One is pending that can be taken as soon as the firmware permits it."""
+        return self._wakes() and not self._active
+
     def _wakes(self) -> bool:
         """WFI goes on at once when an interrupt is pending, permitted or not."""
         return self.uart.wants_interrupt and self.system.enables(UART_RX_IRQ)
 
     def _interrupt_is_due(self) -> bool:
-        return self._wakes() and not self._active and not self._registers[PRIMASK] & 1
+        return self.interrupt_waits and not self._registers[PRIMASK] & 1
 
     def _exceptional(self, error: int) -> None:
         pc = self._registers[PC]
@@ -161,7 +171,7 @@ class Machine:
 
     def _on_permit(self, _handle: Any, _address: int, _size: int, _data: Any) -> None:
         """Interrupts were permitted one instruction ago."""
-        if self._wakes() and not self._active:
+        if self.interrupt_waits:
             self._may_interrupt = True
             self.engine.stop()
 
