@@ -34,8 +34,8 @@ def main(argv: list[str] | None = None) -> int:
         die_with(options.parent)
     stdout = take_stdout()
     image = options.image or IMAGES / f"{options.chip}.elf"
-    if not image.exists():
-        return fail(f"{NAME}: {image}: no such image: {REMEDY}", EXIT_USAGE)
+    if (refusal := _refusal(image)) is not None:
+        return fail(f"{NAME}: {image}: {refusal}: {REMEDY}", EXIT_USAGE)
     wake = wake_pipe(signal.SIGUSR1, signal.SIGTERM, signal.SIGINT)
     try:
         path, _ = parse_url(options.link)
@@ -50,6 +50,15 @@ def main(argv: list[str] | None = None) -> int:
         return _watch(qemu, line, wake)
     finally:
         qemu.close()
+
+
+def _refusal(image: Path) -> str | None:
+    """Why QEMU need not try: it would run any file there is."""
+    try:
+        with image.open("rb") as file:
+            return None if file.read(4) == b"\x7fELF" else "expected an ELF image, got another file"
+    except OSError as error:
+        return "no such image" if isinstance(error, FileNotFoundError) else f"cannot read: {error.strerror}"
 
 
 def _watch(qemu: Qemu, line: int, wake: int) -> int:

@@ -80,10 +80,10 @@ class Qemu:
         return BootRecord(*self.words(stack_top, len(BootRecord._fields)))
 
     def last_words(self) -> str:
-        """The last line of its standard error that is no warning. Waits for its end."""
+        """Its last complaint, "" without any. Waits for its end. A dump of registers may follow a complaint."""
         said = self.process.communicate()[1].decode(errors="replace")
-        lines = [line for line in said.splitlines() if line.strip() and "warning:" not in line]
-        return lines[-1].strip().removeprefix(f"{PROGRAM}: ") if lines else ""
+        lines = [line for line in said.splitlines() if line.startswith("qemu") and "warning:" not in line]
+        return lines[-1].partition(": ")[2].strip() if lines else ""
 
     def close(self) -> None:
         """Gone when this returns; it has nothing to save. Twice is as good as once."""
