@@ -57,6 +57,24 @@ def test_an_edit_of_the_c_is_seen(name: str, recorded: dict[str, list[Episode]],
         assert found.differing > 0
 
 
+@pytest.mark.parametrize(
+    ("file", "before", "after"),
+    [
+        ("pd.c", "wide(in->euler[i]) - s->reading[i]", "in->euler[i] - s->reading[i]"),
+        ("reference.c", "wide(in->setpoint[i]) - in->euler[i]", "in->setpoint[i] - in->euler[i]"),
+        ("fixed.h", "(int64_t)((uint64_t)x << -n)", "x << -n"),
+    ],
+)
+def test_undefined_behaviour_ends_the_sanitized_build(
+    file: str, before: str, after: str, recorded: dict[str, list[Episode]], tmp_path: Path
+) -> None:
+    """Also where the numbers come out right all the same, as those of the first two do."""
+    core = c_build.mutated(tmp_path, file, before, after)
+    program = c_build.program(tmp_path, c_build.sanitized(), core)
+    with pytest.raises(AssertionError, match=r"ended with|runtime error"):
+        run(program, recorded["pd"])
+
+
 def test_an_edit_of_fixed_py_is_seen(recorded: dict[str, list[Episode]], tmp_path: Path) -> None:
     """Though the compiled code of the unedited sources is in the cache: numba alone would not look at that file."""
     packages, cache = tmp_path / "packages", tmp_path / "cache"
