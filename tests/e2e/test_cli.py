@@ -20,7 +20,7 @@ COLUMNS = [
     *("command_x_Nm", "command_y_Nm", "command_z_Nm", "applied_x_Nm", "applied_y_Nm", "applied_z_Nm"),
     *("w_x_radps", "w_y_radps", "w_z_radps", "h_x_Nms", "h_y_Nms", "h_z_Nms", "q_s", "q_x", "q_y", "q_z"),
 ]
-VERBS = [verb.__name__ for verbs in PANELS.values() for verb in verbs]
+VERBS = [verb.__name__.replace("_", "-") for verbs in PANELS.values() for verb in verbs]
 SHORT = ("appc-rs232", "--set", "duration_s=30", "--set", "require=[]")
 
 

@@ -5,6 +5,7 @@ When a change is worth its price: `sil pil-report --json > tests/firmware/budget
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from sil.budget.flight import Flight, flight_of, fly_manoeuvre_a
 from sil.budget.judge import beyond_limits, figures, grown, read_baseline
 from sil.budget.measure import Budget, measure
 from sil.budget.table import Core, below
+from sil.cli import invoke
 from sil.runner import run_scenario
 from sil.runs import open_run
 from sil.scenario import load_scenario
@@ -99,3 +101,41 @@ def test_milliseconds_state_their_assumption(budget: Budget) -> None:
     text = "\n".join(below(budget, core))
     assert "Instructions are not cycles. Milliseconds assume 2 cycles per instruction (--cpi) at 84 MHz" in text
     assert "The paper's board took 345 ms per sample" in text
+
+
+# -- the verb ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch, short: Flight) -> None:
+    """`sil pil-report` flies fifteen seconds of pd, whatever it is asked for."""
+    monkeypatch.setattr("sil.budget.flight.fly_manoeuvre_a", lambda law: short)
+
+
+@pytest.mark.usefixtures("quick")
+def test_the_verb_judges_by_limits_and_baseline(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["pil-report", "pd", "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["beyond"] == []
+    baseline = tmp_path / "before.json"
+    baseline.write_text(json.dumps(plain))
+    assert invoke(["pil-report", "pd", "--against", str(baseline)]) == 0
+    assert "+0.0%" in capsys.readouterr().out
+    plain["laws"]["pd"]["answer"]["max"] -= 1000
+    baseline.write_text(json.dumps(plain))
+    assert invoke(["pil-report", "pd", "--against", str(baseline)]) == 1
+    assert "pd.answer.max: expected at most 2% above " in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["mrak"], "LAWS: expected one of pd, appc, mrac (did you mean mrac?), got 'mrak'"),
+        (["pd", "--against", "nowhere.json"], "nowhere.json: cannot read: No such file or directory"),
+        (["pd", "--image", "nowhere.elf"], "cortex-m: nowhere.elf: no such image: build it with `make firmware`"),
+    ],
+)
+def test_bad_input_is_one_line(arguments: list[str], says: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert invoke(["pil-report", *arguments]) == 2
+    assert capsys.readouterr() == ("", says + "\n")
