@@ -12,6 +12,7 @@ BENCHES: dict[str, str] = {
     "law": "sil.bench.law:LawStep",
     "plant": "sil.bench.plant:PlantSteps",
     "loop": "sil.bench.loop:WholeLoop",
+    "boards": "sil.bench.boards:Boards",
     "lockstep": "sil.bench.lockstep:Lockstep",
     "wakeup": "sil.bench.wakeup:Wakeup",
     "fast": "sil.bench.fast:FastLoop",

@@ -15,7 +15,7 @@ def bench(
         list[str] | None,
         typer.Argument(
             metavar="NAMES",
-            help="codec, recorder, law, plant, loop, lockstep, wakeup, fast. Default: all of them.",
+            help="codec, recorder, law, plant, loop, boards, lockstep, wakeup, fast. Default: all of them.",
         ),
     ] = None,
     repeats: Annotated[
@@ -29,9 +29,9 @@ def bench(
 ) -> int:
     """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
 
-    lockstep: against a bare ping-pong on a pty. wakeup, fast: against cyclictest (Debian package rt-tests), else a
-    small C loop. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder, law: against the
-    least that anybody would have to do.
+    lockstep: against a bare ping-pong on a pty. boards: the firmware, native and emulated, against the Python board.
+    wakeup, fast: against cyclictest (Debian package rt-tests), else a small C loop. plant, loop: against Basilisk (pip
+    install 'attitude-sil\\[bench]'). codec, recorder, law: against the least that anybody would have to do.
 
     All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load
     is in the table.
