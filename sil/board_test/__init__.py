@@ -16,9 +16,10 @@ from sil.board_test.examinee import Examinee, Order, Tell
 from sil.board_test.outcome import FAIL, PASS, SKIPPED, Failed, Silent, Skipped
 from sil.doctor.findings import Finding
 from sil.plugins import load
+from sil.scenario_errors import one_of
 from sil.trouble import SilError, UsageError
 
-__all__ = ["CHECKS", "FAIL", "GROUPS", "PASS", "SKIPPED", "Order", "Tested", "examine"]
+__all__ = ["CHECKS", "FAIL", "GROUPS", "PASS", "SKIPPED", "Order", "Checked", "examine"]
 
 CHECKS = {
     "handshake: echo": "sil.board_test.handshake:echo",
@@ -71,7 +72,7 @@ ALWAYS = ("handshake: echo", "handshake: laws", "end: left")  # others build on 
 GONE = "the board does not answer HELLO any more"
 
 
-class Tested(NamedTuple):
+class Checked(NamedTuple):
     """One check that was made."""
 
     group: str
@@ -79,20 +80,22 @@ class Tested(NamedTuple):
 
 
 def wanted(order: Order) -> list[str]:
-    """The checks to make. Raises UsageError for a group that is none."""
+    """The checks to make. Raises UsageError for a group, or a check, that is none."""
     for option, names in (("--only", order.only), ("--skip", order.skip)):
         for name in names:
-            if name not in GROUPS:
-                raise UsageError(f"{option}: expected one of {', '.join(GROUPS)}, got {name!r}")
+            if name not in GROUPS and name not in CHECKS:
+                group = name.partition(":")[0]
+                known = [check for check in CHECKS if check.startswith(f"{group}:")] or GROUPS
+                raise UsageError(f"{option}: expected {one_of(known, name)}, got {name!r}")
 
     def is_wanted(name: str) -> bool:
-        group = name.partition(":")[0]
-        return name in ALWAYS or ((not order.only or group in order.only) and group not in order.skip)
+        names = {name, name.partition(":")[0]}
+        return name in ALWAYS or ((not order.only or bool(names & set(order.only))) and not names & set(order.skip))
 
     return [name for name in CHECKS if is_wanted(name)]
 
 
-def examine(order: Order, tell: Tell, ask: Tell | None = None) -> Generator[Tested]:
+def examine(order: Order, tell: Tell, ask: Tell | None = None) -> Generator[Checked]:
     """Make the checks, one finding after the other; whatever happens, the board is told STOP and nothing stays behind.
 
     A board that is not there, or of another layout, ends it with the finding that says so. tell(text) is called while
@@ -106,7 +109,7 @@ def examine(order: Order, tell: Tell, ask: Tell | None = None) -> Generator[Test
     at = Examinee(order, tell, ask or tell)
     try:
         for finding in _reached(at):
-            yield Tested("link", finding)
+            yield Checked("link", finding)
             if finding.status == FAIL:
                 return
         yield from _checked(at, names)
@@ -124,16 +127,16 @@ def _reached(at: Examinee) -> Iterator[Finding]:
         yield Finding(FAIL, " ".join(str(error).split()), check="open")
 
 
-def _checked(at: Examinee, names: list[str]) -> Iterator[Tested]:
+def _checked(at: Examinee, names: list[str]) -> Iterator[Checked]:
     gone = False
     for name in names:
         group, _, rest = name.partition(": ")
         for title, check in _variants(at, name, rest or group):
             if gone:
-                yield Tested(group, Finding(SKIPPED, GONE, check=title))
+                yield Checked(group, Finding(SKIPPED, GONE, check=title))
                 continue
             finding = _made(check, at)
-            yield Tested(group, finding._replace(check=title))
+            yield Checked(group, finding._replace(check=title))
             gone = finding.status == FAIL and not at.revive()
 
 

@@ -34,6 +34,7 @@ class Patience:
     hello_s: float = 4.0  # to be there at all
     answer_s: float = 2.0
     ready_s: float = 120.0  # it may compile its law
+    boot_s: float = 30.0
     quiet_s: float = 0.05  # silence that counts as the end of what comes
 
 
@@ -61,7 +62,7 @@ class Bench:
                 self._stray(before)
                 if attempt > 1:
                     self.settle()
-                self.port.reset()
+                self.port.reset(forget=False)
                 assert self.echo is not None
                 return self.echo
         raise Silent(f"HELLO with a new nonce: not answered, {HELLOS} times, within {self._within_s(0):.1f} s each")
@@ -98,7 +99,7 @@ class Bench:
         """The same in any state; what was a session is over, and a new one has begun."""
         self.nonce = fresh_nonce()
         got = self._behind(self.nonce, out)
-        self.port.reset()
+        self.port.reset(forget=False)
         return got
 
     def answer(self, packet: bytes, tick: int) -> list[Packet]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import random
+import time
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+from protocol import frames
 from protocol.codec import MAX_ENCODED, encode
-from protocol.frames import MAX_PACKET, Packet, Type, pack
+from protocol.frames import MAX_PACKET, Packet, Stop, Type, pack
 from protocol.law_tables import LawTable
 from sil.board_test.bench import fresh_nonce
 from sil.board_test.examinee import Examinee
@@ -18,6 +20,7 @@ from sil.doctor.findings import Finding
 
 LONG, VERY_LONG = 300, 5000  # bytes without a zero
 SEED = 4
+PAUSE_S = 0.0005
 
 
 class Case(NamedTuple):
@@ -83,6 +86,7 @@ def cuts(at: Examinee) -> Finding:
             length = size or rng.randrange(1, 40)
             twin.board.raw(data[:length])
             data = data[length:]
+            time.sleep(PAUSE_S)  # a pty would put them together again
         _held(f"bytes in writes of {size or 'any number'}", expected, twin.board.answers())
         tick += 3
     return passed("writes of 1, 2, 3, 7 and any number of bytes")
@@ -102,8 +106,8 @@ def _held(name: str, expected: Sequence[Packet], got: Sequence[Packet]) -> None:
 def _streams(tick: int) -> Iterator[Case]:
     rng = random.Random(SEED)
     good, other = encode(pack(sample(tick), 0)), encode(pack(sample(tick + 1), 0))
-    damaged = bytearray(good)
-    damaged[len(damaged) // 2] ^= 0x01 if damaged[len(damaged) // 2] != 0x01 else 0x02
+    stop = encode(pack(Stop(frames.STOP_DONE), 0))  # were one taken, the SAMPLE behind it would not be answered
+    damaged = stop[:-3] + bytes([stop[-3] ^ 0x40]) + stop[-2:]
     yield Case("three bytes", (b"\x01\x02\x03" + good,))
     yield Case("one byte that is no zero", (b"\xff" + good,))
     yield Case("twenty zeros", (bytes(20) + good + bytes(20),))
@@ -112,11 +116,13 @@ def _streams(tick: int) -> Iterator[Case]:
     yield Case("a candidate a byte too long", (b"\0" + bytes([7]) * (MAX_ENCODED + 1) + good,))
     yield Case(f"a candidate of {LONG} bytes", (bytes([1]) * LONG + good,))
     yield Case(f"a candidate of {VERY_LONG} bytes", (bytes([2]) * VERY_LONG + good,))
-    yield Case("a frame's bytes behind a candidate that is too long", (bytes([3]) * LONG + good[1:] + good,))
+    for count in (1, 100, MAX_ENCODED, MAX_ENCODED + 1, MAX_ENCODED + 2, 256, 2 * MAX_ENCODED, 2 * MAX_ENCODED + 2, 512):
+        yield Case(f"STOP behind {count} bytes of the same candidate", (b"\0" + bytes([3]) * count + stop[1:] + good,))
+    yield Case("a damaged STOP", (damaged + good,))
+    yield Case("STOP without its first zero and byte", (b"\1" + stop[2:] + good,))
     yield Case("a COBS chain that ends too late", (b"\0\xff" + bytes([9]) * 20 + good,))
     yield Case("a frame cut off in the middle", (good[: len(good) // 2] + good,))
     yield Case("a frame without its first bytes", (good[5:] + good,))
-    yield Case("a damaged frame", (bytes(damaged) + good,))
     yield Case("text", (b"\r\nboot: ok\r\n" + good + b"\r\n",))
     yield Case("two frames that share a zero", (good + other[1:],), 2)
     yield Case("two frames, the first without its last zero", (good[:-1] + other,), 2)

@@ -14,7 +14,6 @@ from sil.board_test.outcome import Failed, Silent, Skipped, called, expect, list
 from sil.doctor.findings import Finding
 
 BOOT = "HELLO (nonce 0)"
-BOOTED_WITHIN_S = 30.0
 ASK_EVERY_S = 0.5
 FLOWN = 3
 
@@ -28,7 +27,7 @@ def reset(at: Examinee) -> Finding:
     if at.order.launched:
         at.tell("starting the board again")
         at.replug()
-        how, asked, within_s = "started again", False, BOOTED_WITHIN_S
+        how, asked, within_s = "started again", False, at.order.patience.boot_s
     elif at.order.reset:
         at.bench.settle()
         at.ask(f"press the board's reset button, within {at.order.reset_within_s:g} s")

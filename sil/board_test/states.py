@@ -89,10 +89,11 @@ def _events(bench: Bench, table: LawTable, state: str) -> dict[str, Sent]:
     """What is sent for each event, in order."""
     tick = STATES[state].next_tick
     first, second = part_of(table)
+    taken = tick + 1  # of frames without an effect: were one taken, the probe behind it would show it
     rest = (second,) if state == "half configured" else whole(table, telemetry_every=0)
     other = {
-        "a frame of a board": not_for_a_board(tick),
-        "a refused packet": [packet for _, packet in refused(tick, fresh_nonce(), table)][:4],
+        "a frame of a board": not_for_a_board(taken),
+        "a refused packet": [packet for _, packet in refused(taken, fresh_nonce(), table)][:4],
     }
     same = {} if state == "unconfigured" else {"HELLO, same nonce": [bench.hello()]}
     return {

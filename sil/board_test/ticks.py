@@ -11,7 +11,7 @@ from protocol.law_tables import TELEMETRY_COMMON, LawTable
 from sil.board_test.examinee import Examinee
 from sil.board_test.made import sample, whole
 from sil.board_test.outcome import USED, Failed, expect, passed
-from sil.board_test.twin import Twin, commands, events_of, telemetry
+from sil.board_test.twin import Twin, commands, events_of, telemetry, the_command, word
 from sil.doctor.findings import Finding
 
 LOST, OVERRUNS, DROPPED = (
@@ -22,6 +22,7 @@ MOST_EVENTS = 16
 TRANSIT_US = 6857
 ORDER = ("Command", "Telemetry", "Event")
 RANDOM_STEPS = 300
+BUSY_US = 420_000  # a TICK, or a SAMPLE that took long, makes the next one an overrun
 SEED = 4
 
 
@@ -69,6 +70,7 @@ def answer(at: Examinee) -> Finding:
         for tick in range(7):
             got = twin.send(sample(tick, valid=0 if tick == 5 else 7))
             kinds = [type(frame).__name__ for frame in got]
+            expect(f"tick {tick}: other frames", [], [kind for kind in kinds if kind not in ORDER])
             expect(f"tick {tick}: order of the answer", sorted(kinds, key=ORDER.index), kinds)
             expect(f"tick {tick}: one COMMAND", ["Command"], [kind for kind in kinds if kind == "Command"])
             expect(f"tick {tick}: follows", len(got) - 1, got[0].follows)
@@ -88,7 +90,7 @@ def tick_frame(at: Examinee) -> Finding:
         expect("TICK(6)", [f"6 {_without(twin)}"], _used(got))
         expect("events of TICK(6)", ["SAMPLE_LOST"], _codes(got))
         if twin.table.name == "pd":
-            expect("torque that is repeated", last.torque, commands(got)[0].torque)
+            expect("torque that is repeated", last.torque, the_command(got).torque)
         expect("TICK(8)", [f"{k} {_without(twin)}" for k in (7, 8)], _used(twin.send(Tick(8))))
         expect("TICK(8) again", [], twin.send(Tick(8)))
         expect("SAMPLE(9)", ["9 used"], _used(twin.send(sample(9))))
@@ -108,7 +110,7 @@ def stale(at: Examinee) -> Finding:
         expect("SAMPLE(4)", ["4 used"], _used(got))
         expect("its events", ["STALE_SAMPLE"] * 2, _codes(got))
         expect("ticks in STALE_SAMPLE", [3, 0], [event.a for event in events_of(got)])
-        expect("dropped in TELEMETRY", 2, telemetry(got)[0].words[DROPPED])
+        expect("dropped in TELEMETRY", 2, word(got, DROPPED))
 
     _each(at, check)
     return passed("not answered, counted, told with the next answer")
@@ -148,8 +150,7 @@ def restart(at: Examinee) -> Finding:
         expect("SAMPLE ahead by 5", ["14 restarted"], _used(got))
         expect("its first event", "RESTARTED", (_codes(got) or ["none"])[0])
         expect("RESTARTED", (9, 14), (events_of(got)[0].a, events_of(got)[0].b))
-        words = telemetry(got)[0].words
-        expect("samples lost and dropped", (1, 1), (words[LOST], words[DROPPED]))
+        expect("samples lost and dropped", (1, 1), (word(got, LOST), word(got, DROPPED)))
         expect("SAMPLE(15)", ["15 used"], _used(twin.send(sample(15))))
         expect("TICK ahead by 5", ["21 restarted"], _used(twin.send(Tick(21))))
 
@@ -173,7 +174,7 @@ def watchdog(at: Examinee) -> Finding:
         expect("ticks with the flag and a torque", [], loud)
         invalid = twin.send(sample(18, valid=0))
         expect("a SAMPLE, usable or not, ends it", ["WATCHDOG_OFF"], [c for c in _codes(invalid) if "WATCH" in c])
-        expect("flag then", 0, commands(invalid)[0].flags & frames.FLAG_WATCHDOG)
+        expect("flag then", 0, the_command(invalid).flags & frames.FLAG_WATCHDOG)
         twin.send(sample(19))
 
     _each(at, check, link_limit=LINK_LIMIT)
@@ -187,8 +188,7 @@ def overrun(at: Examinee) -> Finding:
         found = []
         for tick in range(12):
             got = twin.send(sample(tick, transit_us=TRANSIT_US))
-            (command,) = commands(got)
-            found.append(bool(command.flags & frames.FLAG_OVERRUN))
+            found.append(bool(the_command(got).flags & frames.FLAG_OVERRUN))
             expect(f"tick {tick}: event OVERRUN with its flag", found[-1], "OVERRUN" in _codes(got))
         expect("overruns of twelve SAMPLEs", _overruns(300_000, 345_000, len(found)), found)
 
@@ -244,8 +244,7 @@ def identification(at: Examinee) -> Finding:
         twin.send(Tick(30))
         flags = []
         for tick in range(31, 36):
-            (command,) = commands(twin.send(sample(tick)))
-            flags.append(bool(command.flags & frames.FLAG_IDENTIFICATION_PAUSED))
+            flags.append(bool(the_command(twin.send(sample(tick))).flags & frames.FLAG_IDENTIFICATION_PAUSED))
         if twin.table.name != "pd":
             expect("paused in the five ticks behind a lost sample", [True, True, False, False, False], flags)
 
@@ -258,7 +257,7 @@ def setpoints(at: Examinee) -> Finding:
     first = [word.name for word in TELEMETRY_COMMON].index("setpoint_x")
 
     def seen(got: list[Any]) -> tuple[int, ...]:
-        return tuple(telemetry(got)[-1].words[first : first + 3])
+        return tuple(word(got, first + axis) for axis in range(3))
 
     def by_sample(twin: Twin) -> None:
         expect("set-point of SAMPLE(0)", (1, -2, 3), seen(twin.send(sample(0, setpoint=(1, -2, 3)))))
@@ -284,8 +283,8 @@ def many_events(at: Examinee) -> Finding:
             expect("a stale SAMPLE", [], twin.send(sample(0)))
         got = twin.send(Tick(2))
         expect("EVENTs", MOST_EVENTS, len(events_of(got)))
-        expect("follows", len(got) - 1, commands(got)[0].follows)
-        expect("dropped in TELEMETRY", MOST_EVENTS + 4, telemetry(got)[0].words[DROPPED])
+        expect("follows", len(got) - 1, the_command(got).follows)
+        expect("dropped in TELEMETRY", MOST_EVENTS + 4, word(got, DROPPED))
         later = [code for code in _codes(twin.send(sample(3))) if code == "STALE_SAMPLE"]
         expect("STALE_SAMPLEs in the next answer", [], later)
 
@@ -301,16 +300,21 @@ def late_ticks(at: Examinee) -> Finding:
             got = twin.send(sample(tick))
             want = "restarted" if tick == 2**31 - 2 else "used"
             expect(f"SAMPLE({tick})", [f"{tick} {want}"], _used(got))
+        expect("TICK beyond 2^31", [f"{2**31 + 2} {_without(twin)}"], _used(twin.send(Tick(2**31 + 2))))
+        expect("a SAMPLE from before 2^31", [], twin.send(sample(2**31 - 1)))
+        last = frames.NO_TICK - 1
+        expect("SAMPLE of the last tick there is", [f"{last} restarted"], _used(twin.send(sample(last))))
+        expect("TICK of the last tick, again", [], twin.send(Tick(last)))
 
     _each(at, check)
-    return passed("beyond 2^31")
+    return passed("beyond 2^31, up to the last tick there is")
 
 
 def at_random(at: Examinee) -> Finding:
     """Everything at once, in any order, byte for byte as the reference."""
     steps = RANDOM_STEPS if at.baud is None else RANDOM_STEPS // 3
     for table in at.laws:
-        twin = Twin(at, table, link_limit=4, answer_delay_us=100_000, telemetry_every=2)
+        twin = Twin(at, table, link_limit=4, answer_delay_us=BUSY_US, telemetry_every=2)
         rng, tick = random.Random(SEED), 0
         for number in range(steps):
             at.tell(f"{table.name}: step {number + 1} of {steps}")

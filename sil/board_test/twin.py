@@ -95,6 +95,23 @@ def commands(answers: list[Any]) -> list[Command]:
     return [frame for frame in answers if isinstance(frame, Command)]
 
 
+def the_command(answers: list[Any]) -> Command:
+    """The one COMMAND among them. Raises Failed."""
+    found = commands(answers)
+    if len(found) != 1:
+        raise Failed(f"answer: expected one COMMAND, got {len(found)}")
+    return found[0]
+
+
+def word(answers: list[Any], index: int) -> int:
+    """A word of the last TELEMETRY among them. Raises Failed."""
+    found = telemetry(answers)
+    if not found or len(found[-1].words) <= index:
+        got = f"{len(found[-1].words)} words" if found else "none"
+        raise Failed(f"answer: expected TELEMETRY of {len(TELEMETRY_COMMON)} words or more, got {got}")
+    return found[-1].words[index]
+
+
 def events_of(answers: list[Any]) -> list[Event]:
     """The EVENTs among them."""
     return [frame for frame in answers if isinstance(frame, Event)]

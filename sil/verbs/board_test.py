@@ -14,7 +14,7 @@ from sil.verbs import completion
 from sil.verbs.options import JsonOption, JunitOption, print_json
 
 if TYPE_CHECKING:
-    from sil.board_test import Order, Tested
+    from sil.board_test import Order, Checked
     from sil.board_test.show import Sheet
 
 CHECKS_PANEL = "Which checks, and how long"
@@ -36,7 +36,8 @@ def board_test(
         typer.Option(
             "--only",
             metavar="GROUP",
-            help="handshake, states, config, receiver, ticks, numbers, latency, timer, baud, reset, end; repeatable.",
+            help="handshake, states, config, receiver, ticks, numbers, latency, timer, baud, reset, end; "
+            "or one check, such as 'ticks: stale'; repeatable.",
             rich_help_panel=CHECKS_PANEL,
             autocompletion=completion.check_groups,
         ),
@@ -46,7 +47,7 @@ def board_test(
         typer.Option(
             "--skip",
             metavar="GROUP",
-            help="Leave out a group; repeatable.",
+            help="Leave out a group, or a check; repeatable.",
             rich_help_panel=CHECKS_PANEL,
             autocompletion=completion.check_groups,
         ),
@@ -138,7 +139,7 @@ def board_test(
     return EXIT_OK if passed(tested) else EXIT_LINK
 
 
-def _tested(order: Order, sheet: Sheet | None) -> tuple[list[Tested], bool]:
+def _tested(order: Order, sheet: Sheet | None) -> tuple[list[Checked], bool]:
     """(every check that was made, whether somebody interrupted); shown as they come."""
     from sil.board_test import examine
     from sil.doctor.show import Progress
@@ -150,7 +151,7 @@ def _tested(order: Order, sheet: Sheet | None) -> tuple[list[Tested], bool]:
         progress.clear()
         print(text, file=sys.stderr, flush=True)
 
-    tested: list[Tested] = []
+    tested: list[Checked] = []
     try:
         with terminated_like_interrupted(), closing(examine(order, progress.tell, ask)) as coming:
             for each in coming:
