@@ -8,6 +8,9 @@ from typing import NamedTuple
 import pytest
 from powered import MACHINES, Powered
 
+from protocol import frames
+from protocol.frames import Hello
+
 ASK = b"\x00!?!"  # incidents.c
 
 
@@ -96,3 +99,36 @@ def test_a_firmware_that_only_stood_still_is_not_reset(accident_image):
         assert board.all_within(3.0) == []
         record = board.boot_record()
         assert (record.boots, record.exception) == (1, 2)
+
+
+def hellos(first: int, count: int) -> list[Hello]:
+    return [Hello(1, frames.ROLE_LAB, 0, frames.LAYOUT_HASH, nonce, 0, "test") for nonce in range(first, first + count)]
+
+
+def rx_errors(board: Powered) -> int:
+    return board.qemu.words(board.symbols["health"] + 4, 1)[0]
+
+
+def busy_while_80_hellos_come(board: Powered, letter: bytes) -> set[int]:
+    """4.6 kB for a ring of 2 kB; the nonces of the answers."""
+    board.boot_hello()
+    board.link.send(ASK + letter)
+    board.port.send(*hellos(1, 80))
+    return {packet.frame.nonce for packet in board.all_within(2.5)}
+
+
+def test_what_a_full_ring_cannot_take_stays_in_the_uart(accident_image):
+    """So a sender that can be held up, as QEMU and the emulator can, loses nothing."""
+    with Powered("mps2-an386", accident_image["mps2-an386"]) as board:
+        assert busy_while_80_hellos_come(board, b"p") == set(range(1, 81))
+        assert (rx_errors(board), board.boot_record().boots) == (0, 1)
+
+
+def test_what_a_full_ring_cannot_take_is_counted_and_the_next_frame_is_answered(accident_image):
+    """The STM32's interrupt has to take a byte to come to an end."""
+    with Powered("stm32f405", accident_image["stm32f405"]) as board:
+        answered = busy_while_80_hellos_come(board, b"q")
+        assert 30 < len(answered) < 80
+        assert rx_errors(board) > 0
+        board.port.send(*hellos(100, 1))
+        assert board.next().frame.nonce == 100

@@ -22,9 +22,9 @@ def sample(tick: int) -> Sample:
     return Sample(tick, zero, zero, zero, ack, 0, source, 1, (Reading(0, (2**20, 0, 0)), None, None))
 
 
-def session(board: Powered, ticks: int) -> list[Packet]:
+def session(board: Powered, ticks: int, words: tuple[int, ...] = WORDS) -> list[Packet]:
     """From HELLO to the answers to these ticks, TIMING and all."""
-    Session(board.port, 0, lambda: None).open(WORDS, table_hash(TABLE, WORDS), 5.0, lambda _: None)
+    Session(board.port, 0, lambda: None).open(words, table_hash(TABLE, words), 5.0, lambda _: None)
     heard: list[Packet] = []
     for tick in range(ticks):
         board.port.send(sample(tick))
@@ -65,3 +65,14 @@ def test_it_reports_its_stack_and_no_errors(chip):
         bottom = board.qemu.words(board.symbols["stack_bottom"], STACK_BYTES // 4)
         untouched = next(index for index, word in enumerate(bottom) if word != bottom[0])
         assert STACK_BYTES - 4 * untouched == timings[-1].stack_bytes
+
+
+@pytest.mark.parametrize("chip", MACHINES)
+def test_a_burst_longer_than_its_ring_loses_no_byte(chip):
+    """CONFIG with 600 guidance rows comes in one write of 11 kB; the ring holds 2 kB, and the line is held up."""
+    rows = tuple((tick, 2**20, 0, 0) for tick in range(600))
+    with Powered(chip) as board:
+        board.boot_hello()
+        heard = session(board, 16, config_words(TABLE, {}, rows))
+        assert (heard[-1].type, heard[-1].frame.rx_errors, heard[-1].frame.discarded_bytes) == (Type.TIMING, 0, 0)
+        assert board.port.counters.discarded_bytes == 0
