@@ -18,7 +18,7 @@ from sil.pil import library
 
 HERE = Path(__file__).parent
 CORE = library.FIRMWARE / "core"
-WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-fwrapv", f"-I{CORE}")
+WARNINGS = ("-std=c11", "-Wall", "-Wextra", "-Wconversion", "-Werror", f"-I{CORE}")
 SANITIZERS = ("-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 DATAGRAM, NO_TIMER, HEALTH, ONCE = 1, 2, 4, 8
 FOREVER = 2**63 - 1
@@ -208,7 +208,8 @@ class ScriptHal:
 def python_board(steps: Sequence[Step], options: int = 0) -> Heard:
     """The Python board on the same hardware.
 
-    Bytes are handed over one candidate at a time: Port.reset() at a HELLO forgets what was read behind it.
+    Bytes are handed over one candidate at a time: a port checks the numbers of all that it has read, before a HELLO
+    among it lets them begin anew.
     """
     link, hal = ScriptLink(bool(options & DATAGRAM)), ScriptHal()
     port = Port(link)

@@ -32,7 +32,7 @@ from protocol.codec import StreamDecoder, encode
 from protocol.frames import LAYOUT_HASH, Command, Event, Hello, Stop, Tick, Timing, Type
 from protocol.law_tables import config_words, law_by_name
 
-LONG = 100_000  # steps of the long run, a frame or a movement of the clock each
+LONG, COMPARED = 200_000, 60_000  # steps of the long run, a frame or a movement of the clock each
 
 
 def frames_of(data: bytes) -> list[frames.Packet]:
@@ -47,11 +47,11 @@ def test_any_session(c_board: CBoard, seed: int) -> None:
 
 
 def test_a_long_hostile_run(c_board: CBoard, sanitized_program: Path) -> None:
-    """Also under sanitizers; and it visits what there is to visit."""
+    """Nothing for a sanitizer to object to; the first part on the Python board, too. It visits what there is."""
     steps = Laboratory(Random(20)).steps(LONG)
-    expected = python_board(steps)
-    assert_same(c_board.serve(steps), expected)
-    assert_same(heard(sanitized(sanitized_program, "serve", 0, script_of(steps))), expected)
+    expected = python_board(steps[:COMPARED])
+    assert_same(c_board.serve(steps[:COMPARED]), expected)
+    assert_same(heard(sanitized(sanitized_program, "serve", 0, script_of(steps))), c_board.serve(steps))
     seen = [packet for data in expected.writes for packet in frames_of(data)]
     assert {packet.frame.status for packet in seen if packet.type == Type.READY} == {0, 1, 2, 3, 4}
     assert {packet.frame.used for packet in seen if isinstance(packet.frame, Command)} == {1, 2, 3, 4}
