@@ -6,12 +6,14 @@ reference manual (RM0090); whether the silicon agrees, only silicon can tell.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from bare import Bare
 
 from protocol.codec import StreamDecoder
 from protocol.frames import Type, unpack
-from tools.firmware_image import IMAGES
+from tools.firmware_image import IMAGES, build
 
 FLASH = 0x08000000
 RCC_CR, RCC_PLL, RCC_CFGR = 0x40023800, 0x40023804, 0x40023808
@@ -26,14 +28,16 @@ START, UNLOCK, KICK = 0xCCCC, 0x5555, 0xAAAA
 class Chip:
     """Registers that keep what is written, but for a clock controller that answers as far as it is told to."""
 
-    def __init__(self, crystal: bool = True, pll: bool = True, silent: bool = False) -> None:
+    def __init__(
+        self, crystal: bool = True, pll: bool = True, silent: bool = False, image: Path = IMAGES / "stm32f405.elf"
+    ) -> None:
         self.crystal, self.pll, self.silent = crystal, pll, silent
         self.values: dict[int, int] = {}
         self.written: list[tuple[int, int]] = []
         self.incoming: list[tuple[int, int]] = []  # (status, byte)
         self.reads: list[int] = []
         self.sent = bytearray()
-        self.bare = Bare(IMAGES / "stm32f405.elf", FLASH)
+        self.bare = Bare(image, FLASH)
         self.bare.registers(0x40000000, 0x30000, self.read, self.write)
         self.bare.uc.mem_map(0xE0000000, 0x100000)
 
@@ -83,6 +87,11 @@ def test_with_its_crystal_it_runs_at_168_MHz():
     assert (chip.last(RCC_CFGR) >> 10 & 7, chip.last(RCC_CFGR) >> 13 & 7) == (5, 4)  # 42 and 84 MHz
     assert chip.last(USART_DIVIDER) == 729
     assert chip.bare.word(SYSTICK_RELOAD) == 167_999
+
+
+def test_another_crystal_is_a_setting_of_the_build(tmp_path):
+    pll = Chip(image=build("stm32f405", tmp_path, "HSE_MHZ=25")).boot().last(RCC_PLL)
+    assert (pll & 0x3F, pll >> 6 & 0x1FF) == (25, 336)
 
 
 def test_the_flash_waits_before_the_clock_is_fast():
