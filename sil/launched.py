@@ -29,11 +29,13 @@ STOP_S = 1.0
 class LaunchedBoard:
     """A `BoardHost` of a process of ours. A kind of board is a class with a `module` and, if need be, `options`.
 
-    `what`: the process, in the words of a message that says what became of it.
+    `what`: the process, in the words of a message that says what became of it. `tells_incidents`: its standard error
+    says what happened to the board, and nothing else.
     """
 
     module: ClassVar[str]
     what: ClassVar[str] = "board process"
+    tells_incidents: ClassVar[bool] = False
 
     def __init__(self, order: BoardOrder) -> None:
         scheme = order.link_url.partition(":")[0]
@@ -65,13 +67,13 @@ class LaunchedBoard:
             raise LinkFailure(f"board: the {self.what} ended with {_describe(code)}{self._colon_last_words()}")
 
     def post_mortem(self, error: Exception) -> str:
-        """A process that is about to end is given a moment to say why."""
+        """A process that is about to end is given a moment to say why; one that lives on may have told it already."""
         assert self._child is not None
         try:
             self._child.wait(STOP_S)
             self.check_alive()
         except subprocess.TimeoutExpired:
-            return str(error)
+            return f"{error}{self._colon_last_words()}" if self.tells_incidents else str(error)
         except LinkFailure as failure:
             return str(failure)
         return str(error)

@@ -150,8 +150,8 @@ def _fly(
 
 
 def _why(rig: Rig, error: Exception) -> str:
-    """One line; a link that closed is explained by the board that died, if one did."""
-    return rig.host.post_mortem(error) if isinstance(error, LinkError) and rig.host is not None else str(error)
+    """One line; a link that closed, or a board that is silent or says HELLO, is explained by the board if it can."""
+    return rig.host.post_mortem(error) if rig.host is not None and not isinstance(error, JournalError) else str(error)
 
 
 def _close(recorder: JournalRecorder, outcome: Outcome) -> None:

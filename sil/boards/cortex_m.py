@@ -10,3 +10,4 @@ class CortexMBoard(LaunchedBoard):
 
     module = "sil.pil.cortex_m"
     what = "emulated Cortex-M"
+    tells_incidents = True

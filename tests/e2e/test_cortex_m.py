@@ -133,6 +133,13 @@ def test_an_image_of_another_layout_is_refused_with_the_remedy(cli: Cli) -> None
     assert "make firmware" in err
 
 
+def test_at_an_address_only_its_hello_says_that_it_has_no_timer(cli: Cli) -> None:
+    with Hosted() as url:
+        out, err = cli("run", "appc-rs232", "--board", url, "--clock", "scaled:20", code=3)
+    assert out == ""
+    assert "expected one with its own timer for a paced clock, got one without: use --clock lockstep" in err
+
+
 @pytest.mark.parametrize("file", ["nowhere.elf", "text.elf"])
 def test_an_image_that_is_none_is_one_line(tmp_path: Path, file: str) -> None:
     (tmp_path / "text.elf").write_text("no image")
@@ -277,23 +284,20 @@ def test_once_over_udp_ends_with_the_session_and_without_it_serves_the_next(cli:
     assert len(shas) == 1
 
 
-def test_a_reset_in_mid_run_is_told_in_the_boards_log(cli: Cli) -> None:
+def test_a_reset_in_mid_run_is_one_line_that_says_why(cli: Cli) -> None:
     process = cli.start(
-        "run", "appc-rs232", "--board", "cortex-m", "--set", "duration_s=20000", "--set", "require=[]", "--out", "run"
+        "run", "appc-rs232", "--board", "cortex-m", "--set", "duration_s=50000", "--set", "require=[]", "--out", "run"
     )
-    give_up = time.monotonic() + 60
-    while (
-        not (cli.folder / "run" / "run.journal").exists() or (cli.folder / "run" / "run.journal").stat().st_size < 10**5
-    ):
+    journal, give_up = cli.folder / "run" / "run.journal", time.monotonic() + 60
+    while not journal.exists() or journal.stat().st_size < 10**5:
         assert process.poll() is None, process.communicate()
         assert time.monotonic() < give_up
         time.sleep(0.02)
     (pid,) = children_of(process.pid)
     os.kill(pid, signal.SIGUSR1)
-    log = cli.folder / "run" / "board.log"
-    while "reset: the button was pressed" not in log.read_text():
-        assert time.monotonic() < give_up
-        time.sleep(0.02)
-    process.send_signal(signal.SIGINT)
-    process.communicate(timeout=60)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 3
+    last = err.splitlines()[-1]
+    assert last.startswith("board: restarted after tick ")
+    assert ": cortex-m: reset: the button was pressed (SIGUSR1), at " in last
     assert not alive(pid)

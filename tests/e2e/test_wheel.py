@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 from subprocesses import REPO
 
+SHIPPED = ("protocol/", "firmware_sim/", "firmware/", "sil/", "pyproject.toml", "README.md", "LICENSE")
 DECOYS = ("protocol", "firmware_sim", "sil", "numpy")
 
 
@@ -23,11 +24,12 @@ def site(tmp_path_factory):
     source = folder / "source"
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=REPO, capture_output=True, check=True).stdout.decode()
     for name in filter(None, tracked.split("\0")):
-        if name.startswith(("protocol/", "firmware_sim/", "sil/", "pyproject.toml", "README.md", "LICENSE")):
+        if name.startswith(SHIPPED):
             (source / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(REPO / name, source / name)
     command = [sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", str(folder), str(source)]
-    subprocess.run(command, check=True, capture_output=True)
+    said = subprocess.run(command, check=True, capture_output=True, text=True)
+    assert "Deprecat" not in said.stdout + said.stderr
     (wheel,) = folder.glob("*.whl")
     site = folder / "site"
     with zipfile.ZipFile(wheel) as archive:
@@ -67,14 +69,20 @@ def test_it_runs_and_replays_from_a_read_only_installation(site, elsewhere):
     assert found.startswith(str(site))
     summary = json.loads(sil("run", "appc-rs232", "--set", "duration_s=30", "--set", "require=[]", "--json"))
     assert summary["verdict"] == "passed"
-    assert sil("replay", summary["run_dir"], "--board", "process").startswith("identical")
+    for board in ("process", "cortex-m"):
+        assert sil("replay", summary["run_dir"], "--board", board).startswith("identical")
     assert "mrac-rs232" in sil("scenarios")
     assert listing(site) == before
 
 
-def test_the_wheel_holds_the_three_packages_and_their_data(site):
+def test_the_wheel_holds_the_three_packages_the_firmware_and_their_data(site):
     names = {path.relative_to(site).as_posix() for path in site.rglob("*") if path.is_file()}
-    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"protocol", "firmware_sim", "sil"}
+    top = {name.split("/")[0] for name in names if ".dist-info" not in name}
+    assert top == {"protocol", "firmware_sim", "firmware", "sil"}
+    listed = subprocess.run(
+        ["git", "ls-files", "firmware"], cwd=REPO, capture_output=True, text=True, check=True
+    ).stdout
+    assert {name for name in names if name.startswith("firmware/")} == set(listed.split()), "all of it, and no build/"
     assert {"protocol/SPEC.md", "sil/scenarios/mrac-rs232.yaml", "sil/py.typed"} <= names
 
 
@@ -87,4 +95,4 @@ def test_every_package_directory_is_listed_in_pyproject():
         for name in ("protocol", "firmware_sim", "sil")
         for path in (REPO / name).rglob("__init__.py")
     }
-    assert listed == folders
+    assert listed == folders | {"firmware"}, "the firmware is data: its folders are no packages"
