@@ -146,8 +146,8 @@ def test_housekeeping_frames_are_recorded_apart(lab):
 # -- opening a session -----------------------------------------------------------------------------------------------
 
 
-def silent_board(monkeypatch, **limits):
-    """A session with a board that says hello and never gets ready."""
+def silent_board(monkeypatch, hello=None, **limits):
+    """A session with a board that says hello and never gets ready. hello: fields of its HELLO."""
     from protocol.links import inproc
     from protocol.port import Port
 
@@ -159,8 +159,8 @@ def silent_board(monkeypatch, **limits):
     def pump():
         while (packet := board.receive(0.0)) is not None:
             if packet.type == Type.HELLO:
-                echo = packet.frame._replace(role=frames.ROLE_BOARD, flags=frames.HELLO_ECHO)
-                board.send(echo)
+                echo = packet.frame._replace(role=frames.ROLE_BOARD, flags=frames.HELLO_ECHO, build="other")
+                board.send(echo._replace(**(hello or {})))
 
     lab_end.pump = pump
     return Port(lab_end)
@@ -182,3 +182,17 @@ def test_a_board_process_that_dies_while_configuring_is_noticed(monkeypatch):
 
     with pytest.raises(LinkFailure, match="signal 9"):
         Session(port, 0, dead).open((1, 2, 3), 0, 1.0, lambda note: None)
+
+
+@pytest.mark.parametrize(
+    ("hello", "rate_q16", "says"),
+    [
+        ({"protocol_version": 2}, 0, "board 'other': expected protocol 1, got 2: .* `make firmware`"),
+        ({"layout_hash": 0xDEADBEEF}, 0, "expected layout a72d0d2f, got deadbeef, .* `make firmware`"),
+        ({}, 65536, "expected one with its own timer for a paced clock, got one without: use --clock lockstep"),
+    ],
+)
+def test_a_board_that_does_not_fit_is_told_from_its_hello(monkeypatch, hello, rate_q16, says):
+    port = silent_board(monkeypatch, hello)
+    with pytest.raises(LinkFailure, match=says):
+        Session(port, rate_q16, lambda: None).open((1, 2, 3), 0, 1.0, lambda note: None)
