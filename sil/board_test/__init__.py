@@ -19,7 +19,7 @@ from sil.plugins import load
 from sil.scenario_errors import one_of
 from sil.trouble import SilError, UsageError
 
-__all__ = ["CHECKS", "FAIL", "GROUPS", "PASS", "SKIPPED", "Order", "Checked", "examine"]
+__all__ = ["CHECKS", "FAIL", "GROUPS", "PASS", "SKIPPED", "Checked", "Order", "examine"]
 
 CHECKS = {
     "handshake: echo": "sil.board_test.handshake:echo",

@@ -7,29 +7,24 @@ law's model is flown on too. Then how long an answer takes, SAMPLE by SAMPLE.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from itertools import groupby
-from operator import itemgetter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from protocol import frames
 from protocol.channel import TO_BOARD, Clear, Fate, wire_time_ns
 from protocol.codec import encode
-from protocol.frames import Packet, Tick, Type, unpack
+from protocol.frames import Type, unpack
 from protocol.law_tables import LAWS
-from sil.bench.tape import Tape
 from sil.board_test.bench import Bench
 from sil.board_test.examinee import Examinee
 from sil.board_test.made import sample, words_of
 from sil.board_test.outcome import PASS, Failed, Skipped, passed
 from sil.board_test.twin import difference
+from sil.budget.flight import Flight, fly
 from sil.doctor.findings import Finding
 from sil.doctor.verdicts import PERCENTILES, histogram
-from sil.rig import assemble, record_config
 from sil.scenario import Scenario, load_scenario
-from sil.sinks.journal import Fate as Outcome
 from sil.trouble import SilError, UsageError
 
 LOST_EVERY, LOST_IN_A_ROW = 23, 2  # SAMPLEs: two of every 23
@@ -45,13 +40,6 @@ class Gaps(Clear):
         if direction == TO_BOARD and frame_type == Type.SAMPLE and tick % LOST_EVERY >= LOST_EVERY - LOST_IN_A_ROW:
             return Fate(False, t_ns, "gap")
         return super().fate(direction, tick, frame_type, copy, encoded_len, t_ns)
-
-
-class Recorded(NamedTuple):
-    """A flight: the packets of CONFIG, and for each tick its SAMPLE (None: lost) and the reference's answer."""
-
-    config: tuple[bytes, ...]
-    ticks: tuple[tuple[int, bytes | None, tuple[Packet, ...]], ...]
 
 
 def scenario_of(name: str, ticks: int) -> Scenario:
@@ -70,28 +58,6 @@ def law_of(name: str) -> str:
     return load_scenario(name).law.name
 
 
-def fly(scenario: Scenario) -> Recorded:
-    """What the reference answers in flight."""
-    tape = Tape()
-    rig = assemble(scenario, tape, None, lambda line: None, channel=Gaps(scenario.link.baud))
-    try:
-        record_config(rig, tape, 0)
-        rig.loop.run(lambda: False, lambda tick, motion: None)
-    finally:
-        rig.stop(frames.STOP_DONE)
-    rows = [arguments for name, arguments in tape.rows if name == "packet"]
-    config = tuple(packet for _, _, _, packet in rows if packet[1] == Type.CONFIG)
-    return Recorded(config, tuple(_ticks([row for row in rows if row[3][1] != Type.CONFIG])))
-
-
-def _ticks(rows: list[tuple[Any, ...]]) -> Iterator[tuple[int, bytes | None, tuple[Packet, ...]]]:
-    """The rows of the tape, tick by tick; a SAMPLE that was lost is None."""
-    for tick, group in groupby(sorted(rows, key=itemgetter(0)), key=itemgetter(0)):
-        sample_row, *answer = group
-        sent = sample_row[3] if sample_row[2] == Outcome.DELIVERED else None
-        yield tick, sent, tuple(unpack(packet) for _, _, _, packet in answer)
-
-
 # -- numbers -----------------------------------------------------------------------------------------------------------
 
 
@@ -103,21 +69,22 @@ def numbers(at: Examinee, name: str) -> Finding:
         raise Skipped(f"{name}: the board has no law {law.name}")
     at.tell(f"flying {name} with the reference")
     try:
-        flight = fly(scenario)
+        flight = fly(scenario, Gaps(scenario.link.baud))
     except SilError as error:
         raise Failed(f"{name}: the reference does not fly it: {error}") from None
     _configure(at.bench, flight)
-    for tick, sent, expected in flight.ticks:
+    frames_compared = 0
+    for sent, answer in flight.ticks:
+        tick, expected = unpack(sent).tick, [unpack(packet) for packet in answer]
         at.tell(f"{name}: tick {tick} of {len(flight.ticks)}")
-        got = at.bench.answer(at.bench.port.pack(Tick(tick)) if sent is None else sent, tick)
-        if said := difference(list(expected), got):
+        if said := difference(expected, at.bench.answer(sent, tick)):
             raise Failed(f"{law.name}: {said}", data={"scenario": name, "first_differing_tick": tick})
-    frames_compared = sum(len(expected) for _, _, expected in flight.ticks)
+        frames_compared += len(expected)
     said = f"{name}: {len(flight.ticks)} ticks, {frames_compared} frames, the same bytes"
     return passed(said, scenario=name, law=law.name, ticks=len(flight.ticks), frames=frames_compared)
 
 
-def _configure(bench: Bench, flight: Recorded) -> None:
+def _configure(bench: Bench, flight: Flight) -> None:
     """The recorded packets, numbers and all."""
     bench.greet()
     bench.port.write(*flight.config)

@@ -116,7 +116,7 @@ def _streams(tick: int) -> Iterator[Case]:
     yield Case("a candidate a byte too long", (b"\0" + bytes([7]) * (MAX_ENCODED + 1) + good,))
     yield Case(f"a candidate of {LONG} bytes", (bytes([1]) * LONG + good,))
     yield Case(f"a candidate of {VERY_LONG} bytes", (bytes([2]) * VERY_LONG + good,))
-    for count in (1, 100, MAX_ENCODED, MAX_ENCODED + 1, MAX_ENCODED + 2, 256, 2 * MAX_ENCODED, 2 * MAX_ENCODED + 2, 512):
+    for count in (1, 100, *range(MAX_ENCODED, MAX_ENCODED + 3), 256, *range(2 * MAX_ENCODED, 2 * MAX_ENCODED + 3), 512):
         yield Case(f"STOP behind {count} bytes of the same candidate", (b"\0" + bytes([3]) * count + stop[1:] + good,))
     yield Case("a damaged STOP", (damaged + good,))
     yield Case("STOP without its first zero and byte", (b"\1" + stop[2:] + good,))

@@ -8,6 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from protocol import frames
+from protocol.channel import Channel
 from protocol.frames import STOP_DONE, Tick, Type
 from sil.rig import assemble
 from sil.runs import Run
@@ -52,14 +53,18 @@ class _Row:
 
 def fly_manoeuvre_a(law: str, *sets: str) -> Flight:
     """The whole of it with noise, by the Python board in this process, in lockstep; nothing is written."""
-    scenario = load_scenario(SCENARIOS[law], [*MANOEUVRE_A, *sets])
+    return fly(load_scenario(SCENARIOS[law], [*MANOEUVRE_A, *sets]))
+
+
+def fly(scenario: Scenario, channel: Channel | None = None) -> Flight:
+    """A scenario in lockstep, by the board that it names; nothing is written. channel: None loses nothing."""
     kept = _Kept()
-    rig = assemble(scenario, kept, None, lambda line: None)
+    rig = assemble(scenario, kept, None, lambda line: None, channel=channel)
     try:
         rig.loop.run(lambda: False, lambda tick, motion: None)
     finally:
         rig.stop(STOP_DONE)
-    return _flight(law, rig.config_packets, kept.rows)
+    return _flight(scenario.law.name, rig.config_packets, kept.rows)
 
 
 def flight_of(run: Run, scenario: Scenario) -> Flight:

@@ -8,9 +8,12 @@ far is what the scenario's requirements say of each run.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sil.budget.flight import flight_of
+from sil.budget.measure import Instructions, measure
 from sil.ladder.rungs import FIXED, Rung
 from sil.report.diff import Difference, diff
 from sil.runner import run_scenario
@@ -19,11 +22,14 @@ from sil.scenario import Scenario
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, SilError
 from sil.watch import Watch
 
+COUNTED_TICKS = 1200
+
 
 class Step(NamedTuple):
     """What came of one rung. summary: of its run, {} where it did not fly; why_not: why, in one line.
 
     below: name of the rung it is held against, "" where none flew; difference: what `sil diff` finds between the two.
+    instructions: of a step of the law, where they can be counted; not_counted: why they were not, in one line.
     """
 
     rung: Rung
@@ -32,6 +38,8 @@ class Step(NamedTuple):
     below: str = ""
     same_form: bool = False
     difference: Difference | None = None
+    instructions: Instructions | None = None
+    not_counted: str = ""
 
     @property
     def exit_code(self) -> int:
@@ -62,6 +70,9 @@ def climb(
                 same_form = last[0].form == rung.form == FIXED
                 step = step._replace(below=last[0].name, same_form=same_form, difference=diff(last[1], run))
             last = rung, run
+            if rung.counted and step.exit_code != EXIT_INTERRUPTED:
+                watch.note(f"{rung.name}: counting its instructions")
+                step = _counted(step, run, scenario)
         yield step
         if step.exit_code == EXIT_INTERRUPTED:
             return
@@ -73,6 +84,16 @@ def _fly(rung: Rung, scenario: Scenario, folder: Path, watch: Watch) -> Step:
         return Step(rung, run_scenario(scenario, place, watch))
     except SilError as error:  # the scenario is sound: it is the board that is not to be had
         return Step(rung, {}, why_not=" ".join(str(error).split()))
+
+
+def _counted(step: Step, run: Run, scenario: Scenario) -> Step:
+    """The first ticks once more, on an emulator that counts, which takes some ten times as long."""
+    flight = flight_of(run, scenario)
+    try:
+        budget = measure([replace(flight, ticks=flight.ticks[:COUNTED_TICKS])])
+    except SilError as error:
+        return step._replace(not_counted=" ".join(str(error).split()))
+    return step._replace(instructions=budget.laws[scenario.law.name].law_step)
 
 
 def exit_code_of(steps: Sequence[Step]) -> int:

@@ -17,12 +17,16 @@ FLOAT, FIXED = "float", "fixed"
 
 
 class Rung(NamedTuple):
-    """One step of the ladder. `about`: what runs there, for people; `form`: the law's arithmetic."""
+    """One step of the ladder. `about`: what runs there, for people; `form`: the law's arithmetic.
+
+    counted: its instructions can be counted.
+    """
 
     name: str
     about: str
     board: str
     form: str = FIXED
+    counted: bool = False
 
     @property
     def folder(self) -> str:
@@ -36,7 +40,7 @@ RUNGS = {
         Rung("float", "MIL: the float64 law, in the plant's process", "inproc", FLOAT),
         Rung("fixed", "SIL: the fixed-point law in Python, a process of its own", "process"),
         Rung("native", "SIL: the firmware in C, compiled for this machine", "native"),
-        Rung("cortex-m", "PIL: the firmware's ARM image, on an emulated Cortex-M", "cortex-m"),
+        Rung("cortex-m", "PIL: the firmware's ARM image, on an emulated Cortex-M", "cortex-m", counted=True),
         Rung("qemu", "PIL: the same image in QEMU, over its UART", "qemu"),
     )
 }
@@ -74,9 +78,8 @@ def scenarios(name: str, sets: Sequence[str], rungs: Iterable[Rung]) -> list[tup
         raise UsageError(f"{plain.name}: expected a scenario with a board, got board none: there is no ladder to climb")
     fixed = [rung.name for rung in wanted if rung.form == FIXED]
     if is_user_law(plain.law.name) and fixed:
-        raise UsageError(
-            f"law {plain.law.name}: a law of your own has a float form only, got --rungs {','.join(fixed)}"
-        )
+        got = f"rungs {', '.join(fixed)} (--rungs float leaves them out)"
+        raise UsageError(f"law {plain.law.name}: a law of your own has a float form only, got {got}")
     flights = [(rung, load_scenario(name, [*sets, *_overrides(rung)])) for rung in wanted]
     for rung, scenario in flights:
         try:

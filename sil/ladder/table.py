@@ -24,8 +24,14 @@ SHA_SHOWN = 8  # hexadecimal digits; --json has all 64
 
 
 def verdict(steps: Sequence[Step], interrupted: bool = False) -> str:
-    """Of the whole ladder. interrupted: between two rungs, so that no step says so."""
-    return WORDS[_exit_code(steps, interrupted)]
+    """Of the whole ladder: what is wrong for certain comes before what is not shown, unlike in the exit code.
+
+    interrupted: between two rungs, so that no step says so.
+    """
+    code = _exit_code(steps, interrupted)
+    if code == EXIT_LINK and any(step.differs or step.exit_code == EXIT_REQUIREMENT for step in steps):
+        code = EXIT_REQUIREMENT
+    return WORDS[code]
 
 
 def _exit_code(steps: Sequence[Step], interrupted: bool) -> int:
@@ -54,23 +60,40 @@ def table(steps: Sequence[Step], width: int) -> Table:
 def legend(steps: Sequence[Step], width: int) -> Iterator[str]:
     """What the table has no room for: what runs on each rung, and what its columns mean."""
     if width < WIDE:
-        yield from (f"{_short(step.rung.name):<9}{step.rung.about}" for step in steps)
-    yield "angle, torque: largest deviation from the rung below; differs at tick: first one with another frame"
+        yield from (f"{_short(step.rung.name):<10}{step.rung.about}" for step in steps)
+        yield ""
+    yield "angle, torque: largest deviation from the rung below; differs at tick: the first"
+    yield "with another frame; instr.: of the law's step, mean"
 
 
 def found(steps: Sequence[Step]) -> Iterator[Text]:
     """What is wrong, a line each; the first differing frame is decoded."""
     for step in steps:
         if step.why_not:
-            yield Text.assemble((f"{step.rung.name}: ", WARN), step.why_not)
+            yield Text.assemble((f"{step.rung.name}: ", WARN), step.why_not.removeprefix(f"{step.rung.name}: "))
         elif step.summary["failure"]:
             yield Text.assemble((f"{step.rung.name}: ", BAD), step.summary["failure"])
         for line in step.summary.get("require", ()):
             if not line["passed"]:
                 yield Text.assemble((f"{step.rung.name}: not met: ", BAD), requirement_text(line))
+        if step.not_counted:
+            yield Text.assemble((f"{step.rung.name}: ", WARN), f"instructions not counted: {step.not_counted}")
         if step.differs and step.difference is not None:
-            yield Text(f"{step.rung.name} (b) is not {step.below} (a), bit for bit:", style=BAD)
-            yield Text(difference_text(step.difference))
+            yield from _what_differs(step, step.difference, _same_bytes(step, steps))
+
+
+def _what_differs(step: Step, difference: Difference, twin: str) -> Iterator[Text]:
+    """twin: name of a lower rung with the same bytes, "" where there is none: else it is that one that is odd."""
+    if twin:
+        yield Text(f"{step.rung.name} is {twin}, bit for bit, but not {step.below}", style=BAD)
+        return
+    yield Text(f"{step.rung.name} (b) is not {step.below} (a), bit for bit:", style=BAD)
+    yield Text(difference_text(difference), no_wrap=True, overflow="ignore")
+
+
+def _same_bytes(step: Step, steps: Sequence[Step]) -> str:
+    below = steps[: steps.index(step)]
+    return next((each.rung.name for each in below if each.summary.get("sha256") == step.summary["sha256"]), "")
 
 
 def last_line(steps: Sequence[Step], name: str, folder: Path, interrupted: bool = False) -> Text:
@@ -103,7 +126,8 @@ def _figures(step: Step) -> tuple[Text | str, ...]:
     times = step.summary["timing"]["times_real_time"]
     sha256 = step.summary["sha256"][:SHA_SHOWN]
     compared = ("-",) * 3 if step.difference is None else _compared(step, step.difference)
-    return (*compared, "-", f"{times:,.0f}" if times >= 10 else f"{times:.2g}", sha256)
+    counted = f"{step.instructions.mean:,.0f}" if step.instructions is not None else "-"
+    return (*compared, counted, f"{times:,.0f}" if times >= 10 else f"{times:.2g}", sha256)
 
 
 def _compared(step: Step, difference: Difference) -> tuple[Text, ...]:
@@ -148,7 +172,7 @@ def _step(step: Step) -> dict[str, Any]:
         "ticks": summary.get("ticks", 0),
         "sha256": summary.get("sha256"),
         "times_real_time": summary["timing"]["times_real_time"] if summary else None,
-        "instructions_per_step": None,
+        "instructions_per_step": step.instructions._asdict() if step.instructions is not None else None,
         "require": summary.get("require", []),
         "compared_with": step.below or None,
         "must_be_identical": step.same_form,

@@ -5,16 +5,17 @@ from __future__ import annotations
 import sys
 import time
 from contextlib import closing
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sil.trouble import EXIT_LINK, EXIT_OK
 from sil.verbs import completion
-from sil.verbs.options import JsonOption, JunitOption, print_json
+from sil.verbs.options import RESULT_PANEL, JsonOption, print_json
 
 if TYPE_CHECKING:
-    from sil.board_test import Order, Checked
+    from sil.board_test import Checked, Order
     from sil.board_test.show import Sheet
 
 CHECKS_PANEL = "Which checks, and how long"
@@ -95,9 +96,20 @@ def board_test(
     ] = None,
     link: Annotated[
         str,
-        typer.Option("--link", metavar="LINK", help="pty or udp, of a board that is started.", show_default=True),
+        typer.Option(
+            "--link",
+            metavar="LINK",
+            help="pty or udp, of a board that is started.",
+            rich_help_panel=CHECKS_PANEL,
+            autocompletion=completion.own_links,
+        ),
     ] = "pty",
-    junit: JunitOption = None,
+    junit: Annotated[
+        Path | None,
+        typer.Option(
+            "--junit", metavar="FILE", help="JUnit XML for CI: a testcase a check.", rich_help_panel=RESULT_PANEL
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Acceptance test of a board: what protocol/SPEC.md asks of it, its numbers bit for bit, how fast it answers.

@@ -90,6 +90,11 @@ def testable_boards(incomplete: str) -> list[Offer]:
     return _fitting([*started, *_devices(), ("udp://127.0.0.1:5005", "the board at this address")], incomplete)
 
 
+def own_links(incomplete: str) -> list[Offer]:
+    """Links of a board that is started."""
+    return _fitting(LINKS[:2], incomplete)
+
+
 def check_groups(incomplete: str) -> list[Offer]:
     """Groups of checks of `sil board-test`."""
     return _fitting(CHECK_GROUPS, incomplete)

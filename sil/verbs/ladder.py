@@ -10,7 +10,7 @@ import typer
 
 from sil.trouble import EXIT_REQUIREMENT
 from sil.verbs import completion
-from sil.verbs.options import RESULT_PANEL, JsonOption, JunitOption, ScenarioArgument, SetOption, print_json
+from sil.verbs.options import RESULT_PANEL, JsonOption, ScenarioArgument, SetOption, print_json
 
 if TYPE_CHECKING:
     from sil.ladder.climb import Step
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 NOT_A_TERMINAL = 200  # columns of a file or a pipe: nothing is folded
 THE_LADDER = "the ladder"
+RUNGS_PANEL = "Rungs"
 
 
 def ladder(
@@ -30,6 +31,7 @@ def ladder(
             "--with",
             metavar="RUNG",
             help="One more rung: qemu, or serial://PATH, udp://HOST:PORT of a board that already runs; repeatable.",
+            rich_help_panel=RUNGS_PANEL,
             autocompletion=completion.rungs,
         ),
     ] = None,
@@ -40,6 +42,7 @@ def ladder(
             metavar="NAME,NAME",
             help="Which rungs: float, fixed, native, cortex-m, qemu. Default: all but qemu.",
             show_default=False,
+            rich_help_panel=RUNGS_PANEL,
         ),
     ] = None,
     out: Annotated[
@@ -51,7 +54,15 @@ def ladder(
             rich_help_panel=RESULT_PANEL,
         ),
     ] = None,
-    junit: JunitOption = None,
+    junit: Annotated[
+        Path | None,
+        typer.Option(
+            "--junit",
+            metavar="FILE",
+            help="JUnit XML for CI: a testcase a rung, and one for each that has to be the one below, bit for bit.",
+            rich_help_panel=RESULT_PANEL,
+        ),
+    ] = None,
     as_json: JsonOption = False,
 ) -> int:
     """Fly a scenario on every board, from the float law up to the firmware's image; one table says where they differ.
@@ -125,11 +136,12 @@ def _print(steps: list[Step], name: str, folder: Path, interrupted: bool) -> Non
         console.width = NOT_A_TERMINAL
     if steps:
         console.print(table.table(steps, console.width))
+    console.print()
     for line in table.legend(steps, console.width):
         console.print(line, style="dim", markup=False)
-    for text in table.found(steps):
-        console.print(text, soft_wrap=True)
-    console.print(table.last_line(steps, name, folder, interrupted), soft_wrap=True)
+    console.print()
+    for text in (*table.found(steps), table.last_line(steps, name, folder, interrupted)):
+        console.print(text, soft_wrap=not console.is_terminal)
 
 
 def _junit(content: dict[str, Any]) -> str:

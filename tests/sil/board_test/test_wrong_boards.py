@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import mistakes_at_the_end
+import mistakes_in_config
+import mistakes_in_flight
+import mistakes_in_receiving
+import mistakes_in_sessions
 import pytest
 import wrong_boards
-from wrong_boards import WRONG, Babbles, Dies, Wrong
+from mistakes_at_the_end import Babbles, Dies
+from wrong_boards import WRONG, Wrong
 
-from sil.board_test import CHECKS, FAIL, GONE, PASS, SKIPPED, Order, Checked, examine
+from sil.board_test import CHECKS, FAIL, GONE, PASS, SKIPPED, Checked, Order, examine
 from sil.board_test.bench import Patience
 from sil.boards import BOARDS
 
+ALL = (mistakes_in_sessions, mistakes_in_config, mistakes_in_receiving, mistakes_in_flight, mistakes_at_the_end)
 ELSEWHERE = ("timer: steps", "timer: drift", "baud", "config: other cut")  # test_timer.py, test_serial.py; never fails
 QUICK = Patience(hello_s=0.3, answer_s=0.3, ready_s=10.0, boot_s=0.3, quiet_s=0.005)
 
@@ -74,9 +81,7 @@ def test_what_is_wrong_is_said_in_words(made: Made) -> None:
         wrong = by_what[what]
         return made(wrong, check.partition(":")[0])[check].finding.found
 
-    assert said("STOP is ignored", "states: running") == (
-        "STOP, then TICK(0): expected HELLO (nonce 0); got nothing"
-    )
+    assert said("STOP is ignored", "states: running") == ("STOP, then TICK(0): expected HELLO (nonce 0); got nothing")
     assert said("the index of a bad word is one too high", "config: bad words").startswith(
         "pd: form -1: expected status 1, index 2, hash 00000000, got status 1, index 3, hash 00000000; and "
     )
