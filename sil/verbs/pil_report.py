@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sil.budget import SCENARIOS
 from sil.trouble import EXIT_OK, EXIT_REQUIREMENT, UsageError
 from sil.verbs.options import JsonOption, print_json
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from sil.budget.measure import Budget
     from sil.budget.table import Core
 
-LAWS = ("pd", "appc", "mrac")
+LAWS = tuple(SCENARIOS)
 NOT_A_TERMINAL = 200  # columns of a file or a pipe: nothing is folded
 
 
