@@ -10,13 +10,13 @@ from typing import Any
 from protocol import frames
 from protocol.channel import Channel
 from protocol.frames import STOP_DONE, Tick, Type
+from sil.budget import SCENARIOS
 from sil.rig import assemble
 from sil.runs import Run
 from sil.scenario import Scenario, load_scenario
 from sil.sinks.journal import Direction, Fate
 from sil.sinks.nothing import Nothing
 
-SCENARIOS = {"pd": "pd-root-locus", "mrac": "mrac-rs232", "appc": "appc-rs232"}
 MANOEUVRE_A = (
     "guidance.profile=A",
     "sensors.attitude.noise_deg=0.02",
