@@ -13,11 +13,10 @@ from firmware_sim.flight import Flight, FlightRefused
 from firmware_sim.hal import Hal
 from protocol import frames
 from protocol.config import Assembly
-from protocol.frames import Config, Hello, Packet, Ready, Sample, Type
+from protocol.frames import AHEAD_LIMIT, Config, Hello, Packet, Ready, Sample, Type
 from protocol.law_tables import ConfigError, LawTable
 from protocol.port import Port
 
-AHEAD_LIMIT = 4  # a SAMPLE this many ticks ahead is propagated up to; farther ahead is a bumpless re-start
 BUILD = "firmware_sim 1"
 UserLawClass: TypeAlias = tuple[LawTable, type]
 

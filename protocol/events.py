@@ -73,7 +73,7 @@ _KINDS = (
     ),
     EventKind(PLANT_NAN, "PLANT_NAN", "the plant's state is not a number", "tick", ""),
     EventKind(EPOCH_REBASED, "EPOCH_REBASED", "woke more than a period late: the epoch moved", "tick", "us"),
-    EventKind(BOARD_RESTARTED, "BOARD_RESTARTED", "the board answered with HELLO within a session", "tick", ""),
+    EventKind(BOARD_RESTARTED, "BOARD_RESTARTED", "the board said HELLO within a session", "tick", "restarts so far"),
     EventKind(DIVERGED, "DIVERGED", "attitude beyond the scenario's bound", "axis 0, 1, 2", "angle in 1e-3 deg"),
 )
 

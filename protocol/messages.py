@@ -26,6 +26,7 @@ ROLE_LAB, ROLE_BOARD = 0, 1
 HELLO_OWN_TIMER, HELLO_CONFIGURED, HELLO_ECHO = 1 << 0, 1 << 1, 1 << 2
 READY_OK, READY_BAD_WORD, READY_UNKNOWN_LAW, READY_LAW_REFUSES, READY_MISSING_PARTS = 0, 1, 2, 3, 4
 NO_INDEX = 0xFFFF
+AHEAD_LIMIT = 4  # a SAMPLE this many ticks ahead is propagated up to; farther ahead is a bumpless re-start
 STOP_DONE, STOP_INTERRUPTED, STOP_FAILED = 0, 1, 2
 MAX_CONFIG_WORDS = (MAX_BODY - size_of(LAYOUT_BY_TYPE[Type.CONFIG].fields)) // 4
 MAX_TELEMETRY_WORDS = (MAX_BODY - size_of(LAYOUT_BY_TYPE[Type.TELEMETRY].fields)) // 4
@@ -153,6 +154,7 @@ def is_housekeeping(type_: int) -> bool:
 
 
 __all__ = [
+    "AHEAD_LIMIT",
     "EULER",
     "FLAG_ARITHMETIC",
     "FLAG_IDENTIFICATION_PAUSED",

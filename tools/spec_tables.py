@@ -113,7 +113,7 @@ def limits() -> str:
         ("words of one CONFIG", MAX_WORDS),
         ("words in one TELEMETRY", f.MAX_TELEMETRY_WORDS),
         ("EVENTs in one answer", 16),
-        ("ticks ahead that are propagated", 4),
+        ("ticks ahead that are propagated", f.AHEAD_LIMIT),
         ("a sender that finds no room gives up after", f"{link.WRITE_TIMEOUT_S:g} s"),
     )
     return table(("limit", "value"), rows)
