@@ -2,6 +2,8 @@
 
 A tick's answer is COMMAND(k) and the TELEMETRY and EVENT frames it announces. In lockstep `drain` waits for the whole
 answer; in real time it takes what is there. The modelled arrival alone decides whether a command is in time.
+Where the board restarts, what it has not answered stays unanswered, and a new session is opened (rejoin.py): in
+lockstep `drain` waits for it, too; a paced clock goes on, and its ticks are misses.
 """
 
 from __future__ import annotations
@@ -10,11 +12,13 @@ import time
 from array import array
 from collections.abc import Callable
 
-from protocol import events, frames
+from protocol import frames
 from protocol.channel import TO_BOARD, TO_LAB, Channel, Fate
 from protocol.frames import Command, Packet, Sample, Telemetry, Tick, Type
 from protocol.port import Port
 from sil.commands import CommandWindow, ExecutionModel
+from sil.rejoin import Rejoin
+from sil.session import says_restart
 from sil.signals import Recorder
 from sil.sinks.journal import NO_ANSWER, Direction
 from sil.sinks.journal import Fate as Outcome
@@ -22,6 +26,7 @@ from sil.trouble import LinkFailure
 
 ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
 LOOK_EVERY_S = 0.25
+ASK_AFTER_S = 1.0  # of silence, and as often: a board that restarted may have had nobody to tell
 INTERRUPTED_WAIT_ns = 1_000_000_000
 REMEMBERED_TICKS = 256
 EARLY_LIMIT = 1024  # frames; a laboratory that stood still for longer has lost the rest
@@ -42,18 +47,22 @@ class Answers:
         lockstep: bool,
         check_alive: Callable[[], None],
         dead_after_s: float,
+        rejoin: Rejoin,
     ) -> None:
         self._port, self._channel, self._model, self._window = port, channel, model, window
         self._recorder, self._torque_Nm, self._lockstep = recorder, torque_Nm, lockstep
         self._check_alive, self._dead_after_s = check_alive, dead_after_s
-        self._tick = -1  # newest tick a SAMPLE was sent for
-        self._complete = -1  # newest tick whose whole answer is here
+        self._rejoin = rejoin
+        self._first = 0  # tick the session began with
+        self._tick = -1  # newest tick a SAMPLE was sent for, or would have been, had there been a session
+        self._complete = -1  # newest tick of which no more is to come: its whole answer is here, or the board lost it
         self._followers = 0  # frames still to come of the answer under way
         self._done_ns: dict[int, int] = {}
         self._should_use: set[int] = set()  # ticks whose SAMPLE the board has in time, by the model
         self._early: list[Packet] = []  # answers to ticks that are still to come: the board's own timer was faster
         self._sent_wall_ns = 0
-        self._advanced_wall_ns = time.monotonic_ns()
+        self._advanced_wall_ns = self._asked_wall_ns = time.monotonic_ns()
+        self._knows_us = False  # it was asked since its last answer, and is in session
         self.answer_ns = array("q")
         self.last_answer_ns = NO_ANSWER
         self.telemetry: Telemetry | None = None  # the newest that came, for whoever watches
@@ -66,6 +75,12 @@ class Answers:
         """SAMPLE(k), or in lockstep TICK(k) where the link does not deliver it (TICK is never faulted)."""
         tick = self._tick = sample.tick
         self.last_answer_ns = NO_ANSWER
+        if self._rejoin.under_way:
+            self._lost(tick)
+            return
+        if self._rejoin.begins(tick):
+            self._first = tick
+            self._model.restart(tick)
         if not self._sample_size:
             self._sample_size = len(frames.pack(sample, 0)) + ENCODED_EXTRA
         fate = self._channel.fate(TO_BOARD, tick, Type.SAMPLE, 0, self._sample_size, t_ns)
@@ -103,10 +118,14 @@ class Answers:
             return
         while (packet := self._port.receive(0.0)) is not None:
             self._take(packet)
+        if self._rejoin.under_way:
+            self._rejoin.poll()
         self._watch_silence()
 
     def listen(self, timeout_s: float) -> None:
         """Wait up to `timeout_s` for a frame and take it; what a paced clock does between ticks."""
+        if self._rejoin.under_way:
+            timeout_s = min(timeout_s, self._rejoin.poll())
         packet = self._port.receive(timeout_s)
         if packet is not None:
             self._take(packet)
@@ -114,8 +133,8 @@ class Answers:
     def finish(self, tick: int, overdue: bool) -> None:
         """The last answer that counts. `overdue`: its tick is over, so one that is not here by now is a real miss.
 
-        It is waited for all the same: a board that never gives it is dead, and the run has failed. Who interrupts a run
-        does not wait for a dead board.
+        It is waited for all the same: a board that never gives it, or does not come back from a restart, is dead, and
+        the run has failed. Who interrupts a run does not wait for a dead board.
         """
         if not overdue:
             give_up_ns = time.monotonic_ns() + INTERRUPTED_WAIT_ns
@@ -128,8 +147,9 @@ class Answers:
         self._await(tick)
 
     def _await(self, tick: int, given_up: Callable[[], bool] = lambda: False) -> None:
-        while (self._complete < tick or self._followers) and not given_up():
-            packet = self._port.receive(LOOK_EVERY_S)
+        while (self._complete < tick or self._followers or self._rejoin.under_way) and not given_up():
+            wait_s = min(LOOK_EVERY_S, self._rejoin.poll()) if self._rejoin.under_way else LOOK_EVERY_S
+            packet = self._port.receive(wait_s)
             if packet is not None:
                 self._take(packet)
             self._watch_silence()
@@ -141,13 +161,28 @@ class Answers:
             return
         self._check_alive()
         if silent_s > self._dead_after_s:
-            missing = f"{self._followers} frames too few of the answer to" if self._followers else "no answer to"
-            tick = self._complete if self._followers else self._complete + 1
-            raise LinkFailure(f"board: {missing} tick {tick} in {self._dead_after_s:g} s")
+            raise LinkFailure(self._why_dead())
+        if silent_s > ASK_AFTER_S and (time.monotonic_ns() - self._asked_wall_ns) * 1e-9 > ASK_AFTER_S:
+            self._asked_wall_ns = time.monotonic_ns()
+            self._rejoin.ask()
+
+    def _why_dead(self) -> str:
+        if self._followers:
+            missing = f"{self._followers} frames too few of the answer to tick {self._complete}"
+            return f"board: {missing} in {self._dead_after_s:g} s"
+        missing = f"no answer to tick {self._complete + 1} in {self._dead_after_s:g} s"
+        if self._knows_us:
+            return f"board: {missing}, though it is there and in session: a frame was lost on the link"
+        return f"board: it hangs: {missing}, and no watchdog has reset it"
 
     def _take(self, packet: Packet) -> None:
         kind = packet.type
-        if kind in ANSWERS and packet.tick > self._tick:
+        if self._rejoin.under_way:
+            if self._rejoin.take(packet):
+                self._advanced_wall_ns = time.monotonic_ns()
+        elif kind in ANSWERS and packet.tick < self._first:
+            pass  # a fresh board that is up to four ticks behind steps them, and answers: nobody asked (B8)
+        elif kind in ANSWERS and packet.tick > self._tick:
             if len(self._early) < EARLY_LIMIT:
                 self._early.append(packet)
             else:
@@ -156,9 +191,23 @@ class Answers:
             self._command(packet)
         elif kind in (Type.TELEMETRY, Type.EVENT):
             self._follower(packet)
-        elif kind == Type.HELLO and not packet.frame.flags & frames.HELLO_ECHO:
-            self._recorder.event(max(self._tick, 0), events.BOARD_RESTARTED, max(self._tick, 0), 0)
-            raise LinkFailure(f"board: restarted after tick {self._complete} (it says HELLO unasked)")
+        elif kind == Type.READY:
+            self._knows_us = True
+        elif says_restart(packet):
+            self._restarted()
+
+    def _restarted(self) -> None:
+        """What the board had not answered is lost with its memory. What it had answered still acts."""
+        self._lost(self._tick)
+        self._early.clear()
+        self._should_use.clear()
+        self._rejoin.restarted(max(self._tick, 0))
+
+    def _lost(self, tick: int) -> None:
+        """No more answers up to `tick`: COMMANDs that are not here are misses, and no real ones."""
+        for each in range(self._complete + 1, tick + 1):
+            self._window.lost(each)
+        self._complete, self._followers = tick, 0
 
     def _command(self, packet: Packet) -> None:
         command: Command = packet.frame
@@ -169,6 +218,7 @@ class Answers:
         if self._followers:
             self._window.incomplete(self._complete)
         now_ns = self._advanced_wall_ns = time.monotonic_ns()
+        self._knows_us = False
         self._complete, self._followers = tick, command.follows
         if command.used in (frames.PROPAGATED, frames.REPEATED) and tick in self._should_use:
             self._window.board_was_faster(tick)

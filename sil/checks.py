@@ -23,6 +23,7 @@ from sil.schedule import read_schedule
 from sil.sensors import SENSORS
 
 Severity = Literal["error", "warning"]
+ENDS_FOR_GOOD = ("process", "inproc", "native")  # boards without a reset of their own
 ANGLES = ("roll", "pitch", "yaw")
 
 
@@ -57,7 +58,7 @@ def check(scenario: Scenario) -> list[Finding]:
     if scenario.board == "none":
         checks.insert(0, _schedule)
     else:
-        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, *checks, _manoeuvre]
+        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, _restarts, *checks, _manoeuvre]
     found = [finding for each in checks for finding in each(scenario)]
     return sorted(found, key=lambda finding: finding.severity != "error")
 
@@ -137,6 +138,14 @@ def _lateness_limit(scenario: Scenario) -> Iterator[Finding]:
     if limit_ms is not None and scale and limit_ms * 1e-3 > scenario.period_s / scale:
         most = f"at most a period on the wall ({scenario.period_s / scale * 1e3:g} ms), beyond it every tick is late"
         yield _warning(scenario, "timing.max_lateness_ms", most, f"{limit_ms:g}")
+
+
+def _restarts(scenario: Scenario) -> Iterator[Finding]:
+    """A board process that is gone stays gone: nothing starts it again, and the run ends with exit code 3."""
+    limit, board = scenario.restart_limit, scenario.board
+    if limit and board in ENDS_FOR_GOOD and not scenario.link.url.startswith("serial:"):
+        expected = "0, or a board that can restart by itself (cortex-m, qemu, serial://PATH, udp://HOST:PORT)"
+        yield _warning(scenario, "restart_limit", expected, f"{limit} with board {board}")
 
 
 def _deadline(scenario: Scenario) -> Iterator[Finding]:

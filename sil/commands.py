@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple, Protocol
 
 from protocol import events
-from protocol.frames import FRESH, HELD, NO_TICK, ZERO
+from protocol.frames import AHEAD_LIMIT, FRESH, HELD, NO_TICK, ZERO
 
 Torque = tuple[float, float, float]
 LATE_ON_THE_CLOCK, BOARD_FASTER, INCOMPLETE = 0, 1, 2  # b of event REAL_MISS
@@ -48,6 +48,12 @@ class ExecutionModel:
         self._answer_delay_ns = answer_delay_ns
         self._free_at_ns = 0
         self.overrun = False  # the last SAMPLE found the board busy
+
+    def restart(self, first: int) -> None:
+        """A fresh board, whose first SAMPLE is that of tick `first`: it is idle, and steps up to it if that is near."""
+        self._free_at_ns = 0
+        for tick in range(first) if first <= AHEAD_LIMIT else ():
+            self.done_ns(tick, None)
 
     def done_ns(self, tick: int, transit_ns: int | None) -> int:
         """Call once per tick, in order. `transit_ns` of the SAMPLE, None where none reached the board."""
@@ -118,8 +124,10 @@ class CommandWindow:
         self.notices.append((events.REAL_MISS, tick, why))
 
     def lost(self, tick: int) -> None:
-        """The link dropped COMMAND(tick): a miss of the scenario's own making."""
-        self._explained.add(tick)
+        """The link dropped COMMAND(tick), or the board restarted before it: a miss, but not the clock's."""
+        self._unexplained.discard(tick)
+        if tick > self._decided:
+            self._explained.add(tick)
 
     @property
     def real_misses(self) -> int:

@@ -46,7 +46,7 @@ def measure(run: Run) -> dict[str, Any]:
     torque on the body), peak_momentum_Nms, effort_Nms (integral of |applied torque| dt), settling_s (see settling_s).
     One number: diverged_at_s (first tick with an angle beyond metrics.diverged_deg, default 80 deg, or not a number;
     None: never), reference_mismatch_deg (largest difference between the board's reference and ours; None: the board
-    reported none), and the counts missed, late, overruns.
+    reported none), and the counts missed, late, overruns, restarts.
     """
     settings = run.scenario.get("metrics") or {}
     first = int(settings.get("from_tick") or 0)
@@ -247,6 +247,7 @@ def _counts(run: Run) -> dict[str, int]:
         "missed": codes.count(events.COMMAND_MISSED),
         "late": int((run.commands["fate"] == Fate.LATE).sum()),
         "overruns": codes.count(events.OVERRUN),
+        "restarts": codes.count(events.BOARD_RESTARTED),
     }
 
 

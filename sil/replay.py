@@ -3,7 +3,8 @@
 Per tick the board gets what it got then (the SAMPLE, or TICK where none reached it in time), and its COMMAND, TELEMETRY
 and EVENT frames are held against the recorded ones. It stops at the first difference, since every later sample answers
 a command that this board did not give. A changed parameter shows as a difference of CONFIG, which is reported apart.
-A tick without a recorded answer is a difference, too, but for the last ones of a run that did not finish.
+A tick without a recorded answer is a difference, too, but for the last ones of a run that did not finish, or of a
+session that ended because the board restarted: these expect none, and a last answer that was cut off expects no more.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ class Report:
 
     ticks: int = 0
     sessions: int = 0
+    lost: int = 0  # ticks whose answer the board lost when it restarted; not compared
     config: list[tuple[str, str, str]] = field(default_factory=list)
     law_file: str = ""  # "" or what is to be said about a user's law whose file is not the recorded one
     first: Difference | None = None
@@ -114,7 +116,8 @@ class RecordedTick(NamedTuple):
     used: bool  # the board stepped on the SAMPLE
     stale: tuple[int, ...]  # ticks of SAMPLEs that came since the last step, too late for their own
     answer: tuple[bytes, ...]
-    open_end: bool  # the run ended before the answer: none is expected
+    open_end: bool  # the run, or the board's memory, ended before the answer: none is expected
+    cut_off: bool  # it ended within the answer: only what came is compared
 
 
 class RecordedSession(NamedTuple):
@@ -125,28 +128,43 @@ class RecordedSession(NamedTuple):
 
 
 def _sessions(run: Run) -> Iterator[RecordedSession]:
+    """Tick by tick; without the last ticks that were never answered, if the run or the session ended unasked."""
     starts = run.sessions or [0]
     unfinished = run.end.get("reason") != "finished"
-    last_answer = max(row.tick for row in run.packets if row.direction == "down" and row.type in ANSWERS)
+    restarts = [event.tick for event in run.events if event.code == events.BOARD_RESTARTED]
     for number, start in enumerate(starts):
-        stop = starts[number + 1] if number + 1 < len(starts) else None
+        last = number + 1 == len(starts)
+        stop = None if last else starts[number + 1]
         rows = [row for row in run.packets if row.tick >= start and (stop is None or row.tick < stop)]
         config = tuple(row.packet for row in rows if row.type == Type.CONFIG)
+        answered = max((row.tick for row in rows if _is_answer(row)), default=-1)
+        open_end = not last or unfinished or any(tick >= max(start, answered) for tick in restarts)
         ticks = tuple(
-            _recorded(tick, list(group), open_end=unfinished and tick > last_answer)
+            _recorded(tick, list(group), open_end and tick > answered, open_end and tick == answered)
             for tick, group in groupby(rows, key=lambda row: row.tick)
         )
         yield RecordedSession(config, tuple(tick for tick in ticks if tick.sample is not None))
 
 
-def _recorded(tick: int, rows: list[PacketRow], open_end: bool) -> RecordedTick:
+def _is_answer(row: PacketRow) -> bool:
+    return row.direction == "down" and row.type in ANSWERS
+
+
+def _recorded(tick: int, rows: list[PacketRow], open_end: bool, last: bool) -> RecordedTick:
     sample = next((row for row in rows if row.type == Type.SAMPLE), None)
-    answer = tuple(row.packet for row in rows if row.direction == "down" and row.type in ANSWERS)
+    answer = tuple(row.packet for row in rows if _is_answer(row))
     ordered = tuple(sorted(answer, key=lambda packet: int.from_bytes(packet[2:4], "little")))
     used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
     reported = [_frame(packet) for packet in ordered if packet[TYPE_AT] == Type.EVENT]
     stale = tuple(event.a for event in reported if event is not None and event.code == events.STALE_SAMPLE)
-    return RecordedTick(tick, sample.packet if sample else None, used, stale, ordered, open_end)
+    cut_off = last and _is_cut_off(ordered)
+    return RecordedTick(tick, sample.packet if sample else None, used, stale, ordered, open_end, cut_off)
+
+
+def _is_cut_off(answer: tuple[bytes, ...]) -> bool:
+    """The answer has fewer frames than its COMMAND announces."""
+    command = _frame(answer[0]) if answer else None
+    return isinstance(command, Command) and len(answer) < 1 + command.follows
 
 
 def _stepped_without(answer: tuple[bytes, ...]) -> bool:
@@ -192,10 +210,11 @@ def _replay_session(
         samples = {recorded.tick: recorded.sample for recorded in session.ticks}
         for recorded in session.ticks:
             if recorded.open_end:
-                break
+                report.lost += 1
+                continue
             for tick in recorded.stale:
                 port.write(*filter(None, [samples.get(tick)]))  # the board counts and drops it
-            report.first = _replay_tick(port, recorded, host.check_alive)
+            report.first = _replay_tick(port, recorded, session.ticks[0].tick, host.check_alive)
             if report.first is not None:
                 return
             report.ticks += 1
@@ -205,7 +224,7 @@ def _replay_session(
         host.close()
 
 
-def _replay_tick(port: Port, recorded: RecordedTick, check_alive: Callable[[], None]) -> Difference | None:
+def _replay_tick(port: Port, recorded: RecordedTick, first: int, check_alive: Callable[[], None]) -> Difference | None:
     assert recorded.sample is not None
     if recorded.used:
         if _frame(recorded.sample) is None:
@@ -213,7 +232,9 @@ def _replay_tick(port: Port, recorded: RecordedTick, check_alive: Callable[[], N
         port.write(recorded.sample)
     else:
         port.send(Tick(recorded.tick))
-    answer = _answer(port, recorded.tick, check_alive)
+    answer = _answer(port, recorded.tick, first, check_alive)
+    if recorded.cut_off:
+        answer = answer[: len(recorded.answer)]
     for expected, got in _side_by_side(recorded.answer, answer):
         if expected != got:
             return Difference(recorded.tick, expected, got)
@@ -228,8 +249,9 @@ def _side_by_side(recorded: tuple[bytes, ...], replayed: list[bytes]) -> Iterato
         )
 
 
-def _answer(port: Port, tick: int, check_alive: Callable[[], None]) -> list[bytes]:
-    """COMMAND(tick) and the frames it announces."""
+def _answer(port: Port, tick: int, first: int, check_alive: Callable[[], None]) -> list[bytes]:
+    """COMMAND(tick) and the frames it announces. What a fresh board says of ticks before its session's `first`, up to
+    which it steps alone, is nobody's."""
     give_up = time.monotonic() + DEAD_AFTER_S
     answer: list[bytes] = []
     expected = 1
@@ -242,7 +264,7 @@ def _answer(port: Port, tick: int, check_alive: Callable[[], None]) -> list[byte
             continue
         if packet.type == Type.COMMAND and packet.tick == tick:
             expected = 1 + packet.frame.follows
-        if packet.type in ANSWERS:
+        if packet.type in ANSWERS and packet.tick >= first:
             answer.append(packet.raw)
     return answer
 

@@ -23,6 +23,7 @@ from sil.loop import Loop, Scales, Timing
 from sil.plants import PLANTS
 from sil.plugins import load
 from sil.realtime import may_lock_memory
+from sil.rejoin import Rejoin
 from sil.scenario import Scenario
 from sil.scenario_law import is_user_law
 from sil.schedule import read_schedule
@@ -43,7 +44,7 @@ DEAD_AFTER_S = 10.0
 
 @dataclass
 class Rig:
-    """A rig that is plugged together. `port`, `session`, `host`, `orders`, `answers` are None without a board."""
+    """A rig that is plugged together. What concerns a board is None without one."""
 
     loop: Loop
     clock: Clock
@@ -53,6 +54,7 @@ class Rig:
     host: BoardHost | None = None
     orders: Orders | None = None
     answers: Answers | None = None
+    rejoin: Rejoin | None = None
     config_packets: tuple[bytes, ...] = ()
     plugged: tuple[str, str] = ("none", "")  # kind of board and URL of its link, as board_and_link() found them
 
@@ -128,6 +130,7 @@ def _with_board(
             made.words, made.configuration.hash, WIRED_WITHIN_S if wired else HELLO_WITHIN_S, notify
         )
         rig.config_packets = tuple(packets)
+        rig.rejoin = Rejoin(rig.port, rig.session, scenario.restart_limit, recorder, notify)
         rig.answers = loop.board = _answers(scenario, rig, recorder, channel)
         rig.loop = loop
     except LinkError as error:
@@ -158,6 +161,7 @@ def _housekeeping_to(recorder: Recorder) -> Callable[[str, bytes], None]:
 
 def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel) -> Answers:
     assert rig.orders is not None and rig.port is not None and rig.host is not None and rig.window is not None
+    assert rig.rejoin is not None
     common = rig.orders.configuration.common
     model = ExecutionModel(scenario.period_ns, common["sample_timeout_us"] * 1000, common["answer_delay_us"] * 1000)
     return Answers(
@@ -170,6 +174,7 @@ def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel)
         lockstep=not rig.clock.paced,
         check_alive=rig.host.check_alive,
         dead_after_s=DEAD_AFTER_S,
+        rejoin=rig.rejoin,
     )
 
 

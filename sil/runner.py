@@ -264,7 +264,6 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
     timing = _timing(scenario, outcome, report)
     not_a_number = sum(event.code in (events.NAN, events.PLANT_NAN) for event in run.events)
     exit_code, verdict = _verdict(outcome, judgements, timing["degraded"], not_a_number)
-    window = outcome.rig.window if outcome.rig else None
     return {
         "verdict": verdict,
         "exit_code": exit_code,
@@ -277,9 +276,10 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "metrics": as_json(metrics),
         "require": [plain(judgement._asdict()) for judgement in judgements],
         "not_a_number": not_a_number,
+        "restarted_at_ticks": [event.tick for event in run.events if event.code == events.BOARD_RESTARTED],
         "link": link,
         "timing": timing,
-        "reproducible": not (window.real_misses if window else 0),
+        "reproducible": not link["real_misses"] and not link["restarts"],
         "sha256": report.sha256,
         "law_file": _law_file(scenario),
         "run_dir": str(folder),
@@ -308,6 +308,7 @@ def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int
         "late": metrics["late"],
         "real_misses": rig.window.real_misses if rig is not None and rig.window is not None else 0,
         "overruns": metrics["overruns"],
+        "restarts": metrics["restarts"],
         **{name: getattr(counters, name, 0) for name in PORT_COUNTERS},
         "strays": rig.answers.strays if rig is not None and rig.answers is not None else 0,
     }

@@ -61,9 +61,9 @@ class Run:
     """A run that was read back; names and units: `help(sil.open_run)`. `run[name]`, `run.names`, `run.units`.
 
     path: the MCAP file; directory: where it lies. meta: what decides the numbers (`period_ns`, `seed`, `versions`,
-    ...). scenario: the resolved scenario without clock, link, board, out. end: {"reason", "ticks"}. summary: content
-    of summary.json beside the log, {} without. sessions: ticks at which board sessions started. commands: all COMMAND
-    rows as a structured array (sil.sinks.layouts.COMMAND).
+    ...). scenario: the resolved scenario, only what is run: no clock, link, board, out. end: {"reason", "ticks"}.
+    summary: content of summary.json beside the log, {} without. sessions: ticks at which board sessions started.
+    commands: all COMMAND rows as a structured array (sil.sinks.layouts.COMMAND).
     """
 
     def __init__(self, path: Path, content: mcap_file.Content) -> None:

@@ -39,7 +39,7 @@ from sil.scenario_sections import (
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
 
-NOT_IDENTITY = ("clock", "timing", "link", "board", "out")  # how it is run, not what is run
+NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out")  # how it is run, not what is run
 MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
 
 
@@ -77,6 +77,8 @@ class Scenario(Section):
     """Misses in a row that hold the last torque; then zero."""
     link_limit: Annotated[int, Field(ge=1, le=1_000_000)] = 20
     """Ticks without a SAMPLE until the board commands zero."""
+    restart_limit: Annotated[int, Field(ge=0, le=1000)] = 0
+    """Unasked restarts of the board that the run survives in a new session; one more ends it with exit code 3."""
     sample_timeout_s: Annotated[float, Field(ge=0, le=60)] | None = None
     """How late a SAMPLE may be in real time; null: 0.2 T_s"""
     answer_delay_s: Annotated[float, Field(ge=0, le=60)] = 0.0
@@ -159,7 +161,7 @@ class Scenario(Section):
         return self.model_dump(mode="json")
 
     def identity(self) -> dict[str, Any]:
-        """resolved() without clock, timing, link, board and out: what the numbers of a run depend on."""
+        """resolved() without NOT_IDENTITY: what the numbers of a run depend on."""
         return {key: value for key, value in self.resolved().items() if key not in NOT_IDENTITY}
 
 

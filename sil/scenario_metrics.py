@@ -20,6 +20,7 @@ METRICS: dict[str, tuple[str, ...]] = {
     "missed": (),
     "late": (),
     "overruns": (),
+    "restarts": (),
     "crc_errors": (),
     "discarded_bytes": (),
 }

@@ -83,6 +83,9 @@ class Recorder(Protocol):
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         """A deterministic frame, header to CRC; direction and fate as in sil.sinks.journal."""
 
+    def session(self, tick: int) -> None:
+        """A board session starts at this tick; its CONFIG packets follow."""
+
     def housekeeping(self, direction: int, packet: bytes) -> None:
         """A frame outside every comparison; it is stamped with the host's time and filed under the present tick."""
 

@@ -15,6 +15,9 @@ class Tape:
         self.rows: list[tuple[str, tuple[Any, ...]]] = []
         self.packets: list[bytes] = []
 
+    def session(self, tick: int) -> None:
+        self.rows.append(("session", (tick,)))
+
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         self.packets.append(packet)
         self.rows.append(("packet", (tick, direction, fate, packet)))

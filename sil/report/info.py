@@ -56,6 +56,9 @@ def text(content: Mapping[str, Any]) -> str:
         _row("sampling", f"{content['period_s']:g} s"),
         _row("seed", content["seed"]),
     ]
+    if len(content["sessions"]) > 1:
+        starts = ", ".join(str(tick) for tick in content["sessions"])
+        lines.append(_row("board sessions", f"{len(content['sessions'])}, from ticks {starts}: the board restarted"))
     lines += [_row(key, _short(value)) for key, value in content["identity"].items() if value not in (None, "", {})]
     lines += [_row("sha256", content["sha256"]), "", _heading("roll", "pitch", "yaw")]
     lines += [_metric(name, value) for name, value in _named(content["metrics"]).items()]

@@ -32,6 +32,7 @@ def lines(scenario: Scenario, rig: Rig) -> Iterator[str]:
     )
     yield (
         f"limits: hold {scenario.hold_limit} ticks, link watchdog {scenario.link_limit} ticks, "
+        f"restarts {scenario.restart_limit}, "
         f"sample timeout {scenario.sample_timeout_us / 1000:g} ms, answer delay {scenario.answer_delay_s * 1000:g} ms"
     )
 

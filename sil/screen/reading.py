@@ -169,6 +169,7 @@ class Reader:
             "late": rig.window.late,
             "real_misses": rig.window.real_misses,
             "overruns": self._overruns,
+            "restarts": len(rig.rejoin.ticks) if rig.rejoin is not None else 0,
             "crc_errors": port.crc_errors,
             "discarded_bytes": port.discarded_bytes,
             "unknown": port.unknown,

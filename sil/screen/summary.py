@@ -14,6 +14,7 @@ from sil.screen.palette import AXES, BAD, DIM, GOOD, TITLE, WARN
 
 ALWAYS_SHOWN = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")  # the others if not zero
 NARROWEST = 80  # columns of the table: a narrow terminal wraps it, numbers are never cut
+MOST_TICKS = 8  # of a storm of restarts that the summary names
 BAR = 40  # characters of the fullest line of a histogram
 ROWS = (
     ("rms_error_deg", "rms error to reference", "deg", 1.0),
@@ -72,7 +73,17 @@ def _link(summary: Mapping[str, Any]) -> Iterator[str]:
     if summary["board"] != "none":
         yield "link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items())
     if not summary["reproducible"]:
-        yield f"[{WARN}]not reproducible[/]: commands missed the clock though the model had them in time"
+        yield f"[{WARN}]not reproducible[/]: {'; '.join(_not_reproducible(summary))}"
+
+
+def _not_reproducible(summary: Mapping[str, Any]) -> Iterator[str]:
+    """Why a second run may have other bytes."""
+    ticks = summary.get("restarted_at_ticks") or ()
+    if ticks:
+        shown = ", ".join(map(str, ticks[:MOST_TICKS])) + (", ..." if len(ticks) > MOST_TICKS else "")
+        yield f"the board restarted at tick{'s' * (len(ticks) > 1)} {shown}"
+    if summary["link"].get("real_misses") or not ticks:
+        yield "commands missed the clock though the model had them in time"
 
 
 # -- timing of paced runs ------------------------------------------------------------------------------------------

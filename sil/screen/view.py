@@ -22,7 +22,7 @@ LEAST_EVENTS = 4  # events that charts leave room for
 CHART_LEAST, CHART_MOST = 5, 16  # lines of a row of charts
 CHART_NARROWEST = 60  # columns of the window
 BLANK = Text("")
-GRAVE = frozenset(("real_misses", "crc_errors", "overruns"))
+GRAVE = frozenset(("real_misses", "crc_errors", "overruns", "restarts"))
 ALWAYS = ("missed", "late", "real_misses", "overruns", "crc_errors", "discarded_bytes")
 TRAFFIC = ("sent", "received")
 

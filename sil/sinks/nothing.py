@@ -9,6 +9,9 @@ from sil.signals import Motion, Vector
 class Nothing:
     """A `sil.signals.Recorder` whose rows are gone as soon as they are handed over."""
 
+    def session(self, tick: int) -> None:
+        """Not kept."""
+
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         """Not kept."""
 

@@ -27,6 +27,7 @@ from typing import IO, Any, NamedTuple
 
 from mcap.writer import CompressionType, Writer
 
+from protocol import events
 from sil.sinks import journal as jn
 from sil.sinks.events import OF_THE_HOST
 from sil.sinks.journal import Direction, JournalError, JournalReader, Kind, Record
@@ -239,16 +240,24 @@ def _is_of_the_host(record: Record) -> bool:
 
 
 def _is_whole(records: list[Record]) -> bool:
-    """The tick has its truth and, where a SAMPLE was sent, COMMAND and all frames that COMMAND announces."""
+    """The tick has its truth and, where a SAMPLE was sent, COMMAND and all frames that COMMAND announces.
+
+    Where the board restarted, what is missing never came.
+    """
     packets = [jn.read_packet(record.payload) for record in records if record.kind == Kind.PACKET]
     if not any(record.kind == Kind.TRUTH for record in records):
         return False
     asked = any(p.direction == Direction.UP and RunRows.is_sample(p.packet) for p in packets)
-    if not asked:
+    if not asked or _lost_its_board(records):
         return True
     answers = [p.packet for p in packets if p.direction == Direction.DOWN]
     expected = [RunRows.answer_frames(packet) for packet in answers]
     return any(expected) and len(answers) >= max(expected)
+
+
+def _lost_its_board(records: list[Record]) -> bool:
+    lab_events = [jn.read_event(record.payload)[0] for record in records if record.kind == Kind.LAB_EVENT]
+    return events.BOARD_RESTARTED in lab_events
 
 
 def _writer(file: IO[bytes]) -> Writer:

@@ -70,6 +70,8 @@ def _as_dict(report: Report) -> dict[str, Any]:
     return {
         "identical": report.identical,
         "ticks": report.ticks,
+        "sessions": report.sessions,
+        "lost": report.lost,
         "law_file": report.law_file,
         "config": [{"word": w, "recorded": a, "now": b} for w, a, b in report.config],
         "first_difference": None
@@ -88,7 +90,9 @@ def _found(report: Report) -> list[str]:
     from sil.replay import decoded
 
     if report.first is None:
-        return [f"identical: {report.ticks} ticks, {report.sessions} session{'s' * (report.sessions != 1)}"]
+        found = f"identical: {report.ticks} ticks, {report.sessions} session{'s' * (report.sessions != 1)}"
+        lost = f"; {report.lost} tick{'s' * (report.lost != 1)} without an answer to compare" if report.lost else ""
+        return [found + lost]
     return [
         f"differs at tick {report.first.tick}, after {report.ticks} identical ticks",
         f"  recorded: {decoded(report.first.recorded)}",

@@ -137,10 +137,14 @@ class Rows:
         self.events: list[tuple[int, int, int, int]] = []
         self.truths: list[tuple[int, tuple[float, ...], int]] = []
         self.commits: list[int] = []
+        self.sessions: list[int] = []
         self.kept_house: list[tuple[int, bytes]] = []
 
     def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
         self.packets.append((tick, direction, fate, packet))
+
+    def session(self, tick: int) -> None:
+        self.sessions.append(tick)
 
     def housekeeping(self, direction: int, packet: bytes) -> None:
         self.kept_house.append((direction, packet))

@@ -8,7 +8,7 @@ from benches import StallingClock
 
 from firmware_sim.flight import Flight
 from protocol import events, frames
-from protocol.frames import Command, Hello, Telemetry, Type
+from protocol.frames import Command, Telemetry, Type
 from sil import answers as lab_answers
 from sil import rig as lab_rig
 from sil import session as lab_session
@@ -86,18 +86,6 @@ def test_a_last_answer_that_is_not_here_in_time_is_a_real_miss(lab, answering):
     bench.rig.answers._await = late
     bench.run()
     assert bench.rig.window.real_misses == 1
-
-
-def test_a_board_that_restarts_in_mid_run_is_named_and_recorded(lab, answering):
-    def change(tick, out):
-        hello = Hello(1, frames.ROLE_BOARD, 0, frames.LAYOUT_HASH, 0, 0, "fresh")
-        return out if tick != 10 else [hello]
-
-    answering(change)
-    bench = lab()
-    with pytest.raises(LinkFailure, match="restarted after tick 9"):
-        bench.run()
-    assert bench.rows.events_with(events.BOARD_RESTARTED) == [(10, 10, 0)]
 
 
 def test_answers_to_ticks_far_ahead_are_bounded(lab, answering, monkeypatch):

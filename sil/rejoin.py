@@ -1,0 +1,106 @@
+"""A board that restarts in mid-run: how many of these a run survives, and the session that follows the lost one.
+
+Rules: protocol/SPEC.md, L14 to L16. Nothing here knows whether simulated time stands still meanwhile (lockstep) or goes
+on (a paced clock): whoever waits for frames hands them in and polls.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from protocol import events
+from protocol.frames import Packet
+from protocol.port import Port
+from sil.session import Opening, Session
+from sil.signals import Recorder
+from sil.sinks.journal import Direction, Fate
+from sil.trouble import LinkFailure
+
+BACK_WITHIN_S = 10.0  # from the HELLO that says so to the echo of ours
+SHOWN = 6  # ticks of a storm that a line names
+
+
+class Rejoin:
+    """Counts the restarts of one run's board; `under_way` from one until the next session is READY.
+
+    limit: unasked restarts that the run survives. notify: for a line when the board takes its time.
+    """
+
+    def __init__(
+        self, port: Port, session: Session, limit: int, recorder: Recorder, notify: Callable[[str], None]
+    ) -> None:
+        self._port, self._session, self._limit = port, session, limit
+        self._recorder, self._notify = recorder, notify
+        self._opening: Opening | None = None
+        self._tick = 0  # the newest when the board restarted
+        self._unrecorded = False  # the session has no tick yet
+        self.ticks: list[int] = []  # of every restart so far
+
+    @property
+    def under_way(self) -> bool:
+        """There is no session: nothing may be sent but what opens one."""
+        return self._opening is not None
+
+    def restarted(self, tick: int) -> None:
+        """The board said so after SAMPLE(tick). Raises LinkFailure when that is once too often."""
+        self._tick = tick
+        self._count()
+        self._opening = self._session.again(BACK_WITHIN_S, self._waiting, self._count)
+        self.poll()
+
+    def _count(self) -> None:
+        self.ticks.append(self._tick)
+        self._recorder.event(self._tick, events.BOARD_RESTARTED, self._tick, len(self.ticks))
+        if len(self.ticks) > self._limit:
+            raise LinkFailure(f"board: {self._so_often()} (it says HELLO unasked); restart_limit is {self._limit}")
+
+    def poll(self) -> float:
+        """Send what is due of the handshake; returns for how many seconds nothing else will be."""
+        assert self._opening is not None
+        try:
+            return self._opening.poll()
+        except LinkFailure as failure:
+            raise self._not_back(failure) from None
+
+    def take(self, packet: Packet) -> bool:
+        """A frame that came meanwhile; True when the board is READY again."""
+        assert self._opening is not None
+        count = len(self.ticks)
+        try:
+            self._opening.take(packet)
+        except LinkFailure as failure:
+            raise (failure if len(self.ticks) > count else self._not_back(failure)) from None
+        if not self._opening.done:
+            return False
+        self._opening, self._unrecorded = None, True
+        return True
+
+    def begins(self, tick: int) -> bool:
+        """SAMPLE(tick) is about to leave; True where it is the first one of a later session, which is recorded here."""
+        if not self._unrecorded:
+            return False
+        self._unrecorded = False
+        self._recorder.session(tick)
+        for packet in self._session.packets:
+            self._recorder.packet(tick, Direction.UP, Fate.DELIVERED, packet)
+        return True
+
+    def ask(self) -> None:
+        """Does the board know the session still? It answers CONFIG with READY, without one with HELLO."""
+        self._port.write(*self._session.packets[:1])
+
+    def _waiting(self, waited_s: float) -> None:
+        self._notify(f"board: {self._so_often()}; not ready again after {waited_s:.0f} s")
+
+    def _not_back(self, failure: LinkFailure) -> LinkFailure:
+        reason = str(failure).removeprefix("board: ")
+        return LinkFailure(f"board: {self._so_often()}, and did not come back: {reason}")
+
+    def _so_often(self) -> str:
+        """`restarted at tick 10`, `restarted 3 times, at ticks 10, 12, 12`; of a storm the first and the last ones."""
+        if len(self.ticks) == 1:
+            return f"restarted at tick {self.ticks[0]}"
+        ticks = [str(tick) for tick in self.ticks]
+        if len(ticks) > SHOWN:
+            ticks[SHOWN // 2 : -SHOWN // 2] = ["..."]
+        return f"restarted {len(self.ticks)} times, at ticks {', '.join(ticks)}"
