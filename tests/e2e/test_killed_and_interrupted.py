@@ -103,8 +103,10 @@ def test_a_killed_plant_process_leaves_every_row_up_to_the_tick_before(cli, reco
     assert [p.packet for p in run.packets if p.tick < count] == [p.packet for p in whole.packets if p.tick < count]
 
 
-def test_a_killed_board_is_named_and_what_was_recorded_is_kept(cli):
-    process, board = started(cli)
+@pytest.mark.parametrize("restarts", [0, 3])
+def test_a_killed_board_is_named_and_what_was_recorded_is_kept(cli, restarts):
+    """Nobody starts a board process again: it cannot come back, whatever the scenario allows."""
+    process, board = started(cli, *PACED, "--set", f"restart_limit={restarts}")
     os.kill(board, signal.SIGKILL)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 3

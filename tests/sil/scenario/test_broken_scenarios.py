@@ -35,6 +35,7 @@ BROKEN: dict[str, tuple[str, str, int, str, str]] = {
     ),
     "negative seed": ("seed: -1\n", "seed", 1, "a number not below 0", "-1"),
     "truth instead of a number": ("hold_limit: true\n", "hold_limit", 1, "a whole number", "true"),
+    "restarts without end": ("restart_limit: 1001\n", "restart_limit", 1, "a number not above 1000", "1001"),
     "number instead of truth": ("law: {}\nexpect_missed: 1\n", "expect_missed", 2, "true or false", "1"),
     "infinite duration": ("duration_s: .inf\n", "duration_s", 1, "a finite number in s", "inf"),
     "key given twice": ("seed: 1\nperiod_s: 0.5\nseed: 2\n", "seed", 3, "each key once", "first in line 1"),
@@ -210,10 +211,17 @@ WARNINGS = {
     "a limit beyond the period": (
         "clock: scaled:20\ntiming: {max_lateness_ms: 100}", "timing.max_lateness_ms",
     ),
+    "restarts of a board that nobody starts again": ("restart_limit: 2", "restart_limit"),
     "reference too fast to sample": (
         "guidance: {wn_radps: 1.5, profile: hold}\nplant: {initial: {attitude_deg: [0, 0, 0]}}", "guidance.wn_radps",
     ),
 }  # fmt: skip
+
+
+@pytest.mark.parametrize("board", ["cortex-m", "qemu", "serial:///dev/ttyUSB0", "udp://127.0.0.1:5005"])
+def test_a_board_that_can_restart_may(board: str, tmp_path: Path) -> None:
+    (tmp_path / "x.yaml").write_text(f"board: {board}\nrestart_limit: 2\n")
+    assert check_scenario(str(tmp_path / "x.yaml")) == []
 
 
 @pytest.mark.parametrize("name", WARNINGS)
