@@ -180,13 +180,11 @@ class Answers:
         if self._rejoin.under_way:
             if self._rejoin.take(packet):
                 self._advanced_wall_ns = time.monotonic_ns()
-        elif kind in ANSWERS and packet.tick < self._first:
-            pass  # a fresh board that is up to four ticks behind steps them, and answers: nobody asked (B8)
         elif kind in ANSWERS and packet.tick > self._tick:
             if len(self._early) < EARLY_LIMIT:
                 self._early.append(packet)
             else:
-                self.strays += 1
+                self._stray(packet.tick)
         elif kind == Type.COMMAND:
             self._command(packet)
         elif kind in (Type.TELEMETRY, Type.EVENT):
@@ -213,7 +211,7 @@ class Answers:
         command: Command = packet.frame
         tick = command.tick
         if tick <= self._complete or tick not in self._done_ns:
-            self.strays += 1
+            self._stray(tick)
             return
         if self._followers:
             self._window.incomplete(self._complete)
@@ -238,7 +236,7 @@ class Answers:
     def _follower(self, packet: Packet) -> None:
         """TELEMETRY or EVENT of the answer under way."""
         if packet.tick != self._complete or not self._followers:
-            self.strays += 1
+            self._stray(packet.tick)
             return
         self._followers -= 1
         self._advanced_wall_ns = time.monotonic_ns()
@@ -246,6 +244,10 @@ class Answers:
         if packet.type == Type.TELEMETRY and outcome is Outcome.DELIVERED:
             self.telemetry = packet.frame
         self._recorder.packet(packet.tick, Direction.DOWN, outcome, packet.raw)
+
+    def _stray(self, tick: int) -> None:
+        """Dropped. A fresh board that is up to four ticks behind steps them and answers (B8): that is no anomaly."""
+        self.strays += tick >= self._first
 
     def _fate(self, packet: Packet) -> Fate:
         sent_ns = self._done_ns.get(packet.tick, 0)

@@ -32,20 +32,16 @@ class Rejoin:
         self._port, self._session, self._limit = port, session, limit
         self._recorder, self._notify = recorder, notify
         self._opening: Opening | None = None
+        self.under_way = False  # there is no session: nothing may be sent but what opens one
         self._tick = 0  # the newest when the board restarted
         self._unrecorded = False  # the session has no tick yet
         self.ticks: list[int] = []  # of every restart so far
-
-    @property
-    def under_way(self) -> bool:
-        """There is no session: nothing may be sent but what opens one."""
-        return self._opening is not None
 
     def restarted(self, tick: int) -> None:
         """The board said so after SAMPLE(tick). Raises LinkFailure when that is once too often."""
         self._tick = tick
         self._count()
-        self._opening = self._session.again(BACK_WITHIN_S, self._waiting, self._count)
+        self._opening, self.under_way = self._session.again(BACK_WITHIN_S, self._waiting, self._count), True
         self.poll()
 
     def _count(self) -> None:
@@ -72,7 +68,7 @@ class Rejoin:
             raise (failure if len(self.ticks) > count else self._not_back(failure)) from None
         if not self._opening.done:
             return False
-        self._opening, self._unrecorded = None, True
+        self._opening, self.under_way, self._unrecorded = None, False, True
         return True
 
     def begins(self, tick: int) -> bool:
