@@ -298,6 +298,6 @@ def test_a_reset_in_mid_run_is_one_line_that_says_why(cli: Cli) -> None:
     _, err = process.communicate(timeout=60)
     assert process.returncode == 3
     last = err.splitlines()[-1]
-    assert last.startswith("board: restarted after tick ")
+    assert last.startswith("board: restarted at tick ")
     assert ": cortex-m: reset: the button was pressed (SIGUSR1), at " in last
     assert not alive(pid)
