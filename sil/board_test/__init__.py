@@ -119,11 +119,13 @@ def examine(order: Order, tell: Tell, ask: Tell | None = None) -> Generator[Chec
 
 def _reached(at: Examinee) -> Iterator[Finding]:
     """The link and who is on it."""
-    yield from cable.device(at)
     try:
+        yield from cable.device(at)
         at.plug()
         yield from cable.first_hello(at)
     except (SilError, LinkError) as error:
+        if str(error).startswith("link:"):  # what is wrong is its name
+            raise UsageError(f"board-test: {error}") from None
         yield Finding(FAIL, " ".join(str(error).split()), check="open")
 
 
