@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import zlib
 from collections.abc import Sequence
@@ -114,10 +115,10 @@ def hostile_pieces(seed: int, count: int) -> list[bytes]:
 def any_words(random: Random) -> tuple[int, ...]:
     """CONFIG words of a law; mostly such as it flies with, and never the float form, which a C board does not have."""
     table = random.choice(list(LAWS.values()))
-    rows, tick = [], 0
+    rows, tick, size = [], 0, 2 ** random.choice((20, 22, 24, 29))
     for _ in range(random.choice((0, 1, 3, 40))):
         tick += random.randrange(1, 30)
-        rows.append((tick - 1, *(random.randrange(-(2**29), 2**29) for _ in range(3))))
+        rows.append((tick - 1, *(random.randrange(-size, size) for _ in range(3))))
     values = {
         "period_us": random.choice((200_000, 500_000, 1_000_000)),
         "answer_delay_us": random.choice((0, 0, 150_000, 345_000, 700_000)),
@@ -125,11 +126,12 @@ def any_words(random: Random) -> tuple[int, ...]:
         "telemetry_every": random.choice((0, 1, 1, 3)),
         "link_limit": random.choice((1, 3, 20)),
         "setpoint_source": random.randrange(2),
-        "torque_limit": random.choice((0.0, 0.001, 0.01, 1.0)),
+        "torque_limit": random.choice((0.0, 0.001, 0.1, math.inf, math.inf)),
+        "transport_delay_ticks": random.randrange(5) if table.name == "pd" or random.random() < 0.1 else 1,
         "reference_kind": random.randrange(3),
     }
     words = list(config_words(table, values, rows))
-    for _ in range(random.choice((0, 0, 0, 0, 1, 2))):
+    for _ in range(random.choice((0, 0, 0, 0, 0, 0, 0, 0, 1, 2))):
         words[random.randrange(len(words))] = any_count(random)
     words[FORM] = 0 if words[FORM] == FORM_FLOAT else words[FORM]
     return tuple(words)
@@ -166,9 +168,8 @@ def any_parts(random: Random, words: Sequence[int]) -> list[frames.Config]:
     return parts
 
 
-def any_sample(random: Random, tick: int) -> Sample:
-    """Plausible numbers: attitude within some degrees, so that most torques are within their limits."""
-    angles = tuple(random.randrange(-(2**26), 2**26) for _ in range(3))
+def any_sample(random: Random, tick: int, angles: tuple[int, int, int]) -> Sample:
+    """A SAMPLE with these angles; readings may be missing, invalid, late."""
     small = tuple(random.randrange(-(2**22), 2**22) for _ in range(6))
     present = 7 if random.random() < 0.8 else random.randrange(8)
     values = (angles, (2**30, 0, 0, 0), small[:3])
@@ -187,6 +188,7 @@ class Laboratory:
         self._tick, self._nonce, self._time_ns = 0, 1, 0
         self._words = any_words(random)
         self._numbers = [0, 0]
+        self._angles, self._rates = [0, 0, 0], [0, 0, 0]
 
     def steps(self, count: int) -> list[Step]:
         """From a HELLO on; so many draws, each one step or a few."""
@@ -197,7 +199,7 @@ class Laboratory:
 
     def _next(self) -> list[Step]:
         random, kind = self._random, self._random.randrange(1000)
-        if kind < 480:
+        if kind < 500:
             return [self._sample(0)]
         if kind < 560:
             return [self._tick_frame(0)]
@@ -209,9 +211,9 @@ class Laboratory:
             return [Step(any_bytes(random, self._harmless()))]
         if kind < 900:
             return [self._clock()]
-        if kind < 915:
+        if kind < 906:
             return self._open()
-        if kind < 925:
+        if kind < 920:
             return self._config(any_parts(random, self._words)[-1:])
         return [self._rare(kind)]
 
@@ -221,23 +223,26 @@ class Laboratory:
             return self._frame(Hello(1, 0, 0, LAYOUT_HASH, self._nonce, 0, "again"))
         if kind < 940:
             return self._frame(Hello(1, 1, 7, LAYOUT_HASH, self._nonce + 1, 0, "a board"))
-        if kind < 942:
+        if kind < 941:
             return self._frame(Stop(0))
-        if kind < 944:
+        if kind < 942:
             self._tick = random.choice((NO_TICK - 3, 2**31 - 2, random.randrange(2**32 - 8)))
             return self._sample(0)
         return Step(encode(any_packet(random) if kind < 946 else self._harmless()))
 
     def _harmless(self) -> bytes:
-        """A packet that opens and ends no session."""
-        while (packet := any_packet(self._random))[1] in (Type.HELLO, Type.STOP):
-            pass
-        return packet
+        """A packet that opens and ends no session, and seldom one that carries the board off to another tick."""
+        while True:
+            packet = any_packet(self._random)
+            far = packet[1] in (Type.SAMPLE, Type.TICK) and self._random.random() < 0.97
+            if not far and packet[1] not in (Type.HELLO, Type.STOP):
+                return packet
 
     def _open(self) -> list[Step]:
         """A new session, with a configuration of its own."""
         self._nonce += 1
         self._words, self._tick = any_words(self._random), 0
+        self._angles = [self._random.randrange(-(2**22), 2**22) for _ in range(3)]
         hello = self._frame(Hello(1, 0, 0, LAYOUT_HASH, self._nonce, self._random.choice(RATES), "lab"))
         self._numbers[0] = 0
         return [hello, *self._config(any_parts(self._random, self._words))]
@@ -247,7 +252,15 @@ class Laboratory:
 
     def _sample(self, ahead: int) -> Step:
         tick = self._expected(ahead)
-        return self._frame(any_sample(self._random, tick))
+        return self._frame(any_sample(self._random, tick, self._move()))
+
+    def _move(self) -> tuple[int, int, int]:
+        """Attitude a tick later: a tumble slow enough that most torques stay within their limits."""
+        for axis in range(3):
+            self._rates[axis] = self._rates[axis] * 15 // 16 + self._random.randrange(-(2**14), 2**14)
+            self._angles[axis] += self._rates[axis]
+        x, y, z = ((angle + 2**31) % 2**32 - 2**31 for angle in self._angles)
+        return x, y, z
 
     def _tick_frame(self, ahead: int) -> Step:
         return self._frame(Tick(self._expected(ahead)))
