@@ -22,7 +22,6 @@ from sil.trouble import EXIT_USAGE, LinkFailure, UsageError
 if TYPE_CHECKING:
     from sil.boards import BoardOrder
 
-START_S = 30.0
 STOP_S = 1.0
 
 
@@ -35,6 +34,7 @@ class LaunchedBoard:
 
     module: ClassVar[str]
     what: ClassVar[str] = "board process"
+    start_s: ClassVar[float] = 30.0  # within this time it listens
     tells_incidents: ClassVar[bool] = False
 
     def __init__(self, order: BoardOrder) -> None:
@@ -126,8 +126,8 @@ class LaunchedBoard:
         assert child is not None and child.stdout is not None
         poller = select.poll()
         poller.register(child.stdout, select.POLLIN | select.POLLHUP)
-        if not poller.poll(START_S * 1000):
-            raise LinkFailure(f"board: the {self.what} did not start within {START_S:g} s")
+        if not poller.poll(self.start_s * 1000):
+            raise LinkFailure(f"board: the {self.what} did not start within {self.start_s:g} s")
         line = child.stdout.readline().decode(errors="replace").strip()
         if not line.startswith("listening "):
             said = f"board: the {self.what} said {line!r}, expected 'listening URL'"

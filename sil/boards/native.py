@@ -11,6 +11,7 @@ class NativeBoard(LaunchedBoard):
 
     module = "sil.pil.native"
     what = "native board"
+    start_s = 120.0  # the first time, it compiles
 
     def options(self, order: BoardOrder) -> list[str]:
         """Whether to lock memory."""
