@@ -17,7 +17,7 @@ import signal
 import sys
 from pathlib import Path
 
-from protocol.codec import StreamDecoder, encode
+from protocol.codec import StreamDecoder, decoder_for, encode
 from protocol.frames import MAX_PACKET, Type
 from protocol.links import Link, LinkClosed, LinkError, open_link
 from sil.pil.engine import EngineError
@@ -80,7 +80,7 @@ class PluggedIn:
     def __init__(self, machine: Machine, link: Link, wake_fd: int, once: bool) -> None:
         self._machine, self._link, self._wake_fd, self._once = machine, link, wake_fd, once
         self._from_uart = StreamDecoder()  # towards datagrams
-        self._seen = StreamDecoder()  # to recognise STOP
+        self._seen = decoder_for(link.datagram)  # to recognise STOP
         self.session_over = False
 
     def serve(self) -> None:
@@ -99,11 +99,9 @@ class PluggedIn:
 
     def _exchange(self, data: bytes) -> None:
         """What has come, into the UART; what the firmware answered, in one piece, out again."""
+        packets = self._seen.feed(data)
         if self._link.datagram:
-            packets = [data] if 0 < len(data) <= MAX_PACKET else []
-            data = b"".join(map(encode, packets))
-        else:
-            packets = self._seen.feed(data)
+            data = encode(data) if 0 < len(data) <= MAX_PACKET else b""  # the firmware's to refuse, or its wire cannot
         self._send(self._machine.exchange(data))
         if packets:
             self.session_over = packets[-1][TYPE_AT] == Type.STOP
