@@ -108,7 +108,8 @@ class Flight:
         """
         self._begin()
         self._restarted = True
-        self._pending.insert(0, Event(tick, events.RESTARTED, _word(expected), _word(tick)))  # first: never one too many
+        restarted = Event(tick, events.RESTARTED, _word(expected), _word(tick))
+        self._pending.insert(0, restarted)  # first: never one too many
 
     _restarted = False
 
