@@ -26,7 +26,7 @@ from sil.boards import BoardOrder, plug_in
 from sil.checks import firmware_flies
 from sil.configure import Orders
 from sil.rig import DEAD_AFTER_S, HELLO_WITHIN_S, law_orders, user_law_spec
-from sil.runs import PacketRow, Run
+from sil.runs import PacketRow, Run, readable
 from sil.scenario import Scenario, load_values
 from sil.session import Session
 from sil.trouble import LinkFailure, UsageError
@@ -68,15 +68,17 @@ def replay(
 ) -> Report:
     """Replay `run` into a fresh board of kind `board`, a name in BOARDS, with overrides `a.b=value` of its scenario.
 
-    Raises UsageError (nothing to replay, bad override, a law that is not on this board) and LinkFailure (the board
-    fails or refuses).
+    Raises UsageError (nothing to replay, bad override, a law that is not on this board), RunError (the log makes no
+    sense) and LinkFailure (the board fails or refuses).
     """
-    scenario = recorded_scenario(run, sets, board)
+    with readable(run.path):
+        scenario = recorded_scenario(run, sets, board)
+        recorded = list(_sessions(run))
     for finding in firmware_flies(scenario):
         raise UsageError(str(finding))
     made = law_orders(scenario)
     report = Report(law_file=_changed_law(run, scenario))
-    for session in _sessions(run):
+    for session in recorded:
         report.sessions += 1
         try:
             _replay_session(session, scenario, made, board, report, progress or (lambda tick, ticks: None), len(run))

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+import struct
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -27,10 +29,22 @@ Array = npt.NDArray[Any]
 _OPENED = ("/truth", "/command", "/telemetry", "/event", "/session")
 _REFERENCE_RESTART = 7
 _RAD = np.pi / 180.0
+_UNREADABLE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
+_SECTIONS = {"metrics": dict, "guidance": dict, "law": dict, "plant": dict, "sensors": dict, "require": list}
+_SHOWN = 200  # characters of what is wrong
 
 
 class RunError(Exception):
     """The run cannot be read: one line that names the file."""
+
+
+@contextmanager
+def readable(path: Path) -> Iterator[None]:
+    """Content that is whole by its CRCs and still not what this version writes is a RunError, whatever it led to."""
+    try:
+        yield
+    except _UNREADABLE as error:
+        raise RunError(f"{path}: written by another version, or damaged: {repr(error)[:_SHOWN]}") from error
 
 
 class EventRow(NamedTuple):
@@ -73,8 +87,11 @@ class Run:
         self.end = _parsed(content.metadata.get("end", {"reason": "truncated", "ticks": "0"}))
         self.config_words = _parsed(content.metadata.get("config", {}))
         self.scenario: dict[str, Any] = json.loads(content.attachments.get("scenario.json", b"{}"))
+        _check_sections(self.scenario)
         self.name = str(self.meta.get("name", path.parent.name))
         self.period_ns = int(self.meta["period_ns"])
+        if self.period_ns <= 0:
+            raise ValueError(f"period_ns: expected a number above 0, got {self.period_ns}")
         self.period_s = self.period_ns * 1e-9
         self.truth = _rows(content, "/truth", layouts.TRUTH)
         self.commands = _rows(content, "/command", layouts.COMMAND)
@@ -174,30 +191,33 @@ class Run:
     @cached_property
     def events(self) -> list[EventRow]:
         """All events in the order of the log."""
-        return [
-            EventRow(
-                int(tick), tick * self.period_s, int(code), ("laboratory", "board")[origin], int(a), int(b),
-                event_texts.describe(int(code), int(a), int(b))[1],
-            )
-            for tick, a, b, code, origin in self._events.tolist()
-        ]  # fmt: skip
+        with readable(self.path):
+            return [
+                EventRow(
+                    int(tick), tick * self.period_s, int(code), ("laboratory", "board")[origin], int(a), int(b),
+                    event_texts.describe(int(code), int(a), int(b))[1],
+                )
+                for tick, a, b, code, origin in self._events.tolist()
+            ]  # fmt: skip
 
     @cached_property
     def packets(self) -> list[PacketRow]:
         """All deterministic frames in the order of the log (read when first asked for)."""
         content = _read(self.path, ("/packet/up", "/packet/down"))
         rows = []
-        for direction in ("up", "down"):
-            for message in content.messages[f"/packet/{direction}"]:
-                _, sequence, type_, fate, packet, encoded = layouts.PACKET.unpack(message[1])
-                tick = message[0] // self.period_ns
-                rows.append(PacketRow(tick, direction, type_, sequence, Fate(fate).name.lower(), packet, encoded))
+        with readable(self.path):
+            for direction in ("up", "down"):
+                for message in content.messages[f"/packet/{direction}"]:
+                    _, sequence, type_, fate, packet, encoded = layouts.PACKET.unpack(message[1])
+                    tick = message[0] // self.period_ns
+                    rows.append(PacketRow(tick, direction, type_, sequence, Fate(fate).name.lower(), packet, encoded))
         return sorted(rows, key=lambda row: row.tick)  # stable: up before down, then as written
 
     @cached_property
     def samples(self) -> Array:
         """All SAMPLE rows as a structured array (sil.sinks.layouts.SAMPLE; read when first asked for)."""
-        return _rows(_read(self.path, ("/sample",)), "/sample", layouts.SAMPLE)
+        with readable(self.path):
+            return _rows(_read(self.path, ("/sample",)), "/sample", layouts.SAMPLE)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -262,6 +282,10 @@ class Run:
 
     @cached_property
     def _reference_deg(self) -> Array:
+        with readable(self.path):
+            return self._recomputed_deg()
+
+    def _recomputed_deg(self) -> Array:
         words = self.config_words
         if not all(word.name in words for word in COMMON):
             return np.full((len(self), 3), np.nan)
@@ -303,10 +327,8 @@ def open_run(path: str | os.PathLike[str]) -> Run:
     content = _read(file, _OPENED)
     if "run" not in content.metadata or "/truth" not in content.channels:
         raise RunError(f"{file}: an MCAP log (of {content.library or 'unknown origin'}), but not one of a run")
-    try:
+    with readable(file):
         return Run(file, content)
-    except (KeyError, ValueError, IndexError) as error:
-        raise RunError(f"{file}: written by another version, or damaged: {error!r}") from error
 
 
 def wrapped_deg(angle: Array) -> Array:
@@ -330,6 +352,14 @@ def _read(path: Path, topics: tuple[str, ...]) -> mcap_file.Content:
         raise RunError(f"{path}: {error.strerror or error}") from error
     except mcap_file.McapError as error:
         raise RunError(f"{path}: {error}") from error
+
+
+def _check_sections(scenario: Any) -> None:
+    """What a scenario's sections are, so that whoever reads a run may look into them. Raises ValueError."""
+    kinds = {key: scenario.get(key) for key in _SECTIONS} if isinstance(scenario, dict) else {"": scenario}
+    for key, value in kinds.items():
+        if value is not None and not isinstance(value, _SECTIONS.get(key, dict)):
+            raise ValueError(f"scenario.json: {key}: expected {_SECTIONS.get(key, dict).__name__}, got {value!r}")
 
 
 def _rows(content: mcap_file.Content, topic: str, layout: layouts.Layout) -> Array:

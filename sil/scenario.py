@@ -38,6 +38,7 @@ from sil.scenario_sections import (
 )
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
+from sil.scenarios import is_file
 
 NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out")  # how it is run, not what is run
 MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
@@ -238,11 +239,11 @@ def _law_problems(scenario: Scenario, source: Source, user_table: laws.UserTable
 def _user_table(scenario: Scenario, user_table: laws.UserTable) -> LawTable | str:
     file, class_name = scenario.file_of("law.name"), scenario.law.name.rpartition(":")[2]
     assert file is not None
-    if not file.is_file():
+    if not is_file(file):
         return "a file that exists"
     try:
         return user_table(file, class_name)
-    except (ValueError, TypeError, OSError, SyntaxError) as error:
+    except (ValueError, TypeError, OSError, SyntaxError, OverflowError, RecursionError, MemoryError) as error:
         reason = " ".join(str(error).split())
         return f"class {class_name} with PARAMS = {{name: (default, unit, lsb)}} ({reason})"
 
@@ -340,7 +341,7 @@ def _files(scenario: Scenario) -> Iterator[Problem]:
         yield _problem(scenario, "schedule", "a schedule with board none only", f"board {scenario.board}")
         return
     file = scenario.file_of("schedule")
-    if file is None or not file.is_file():
+    if file is None or not is_file(file):
         yield _problem(scenario, "schedule", "a CSV file that exists", scenario.schedule)
 
 

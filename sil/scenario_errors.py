@@ -55,8 +55,14 @@ class UnknownScenario(ScenarioInvalid):
 
 def key_of(path: Path) -> str:
     """("require", 0, "below") -> require[0].below"""
-    text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
+    text = "".join(f"[{part}]" if isinstance(part, int) else f".{printable(part)}" for part in path)
     return text.removeprefix(".")
+
+
+def printable(text: str) -> str:
+    """The same in one line of at most 60 characters: line breaks and what no terminal shows, escaped."""
+    shown_text = text if text.isprintable() else repr(text)[1:-1]
+    return shown_text if len(shown_text) <= 60 else shown_text[:57] + "..."
 
 
 def unknown_key(place: Where, path: Path, known: Iterable[str]) -> Problem:

@@ -40,8 +40,13 @@ class Section(BaseModel):
 
 
 def is_number(value: object) -> bool:
-    """A finite int or float; true and false are no numbers."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    """An int or float that float64 holds, finite; true and false are no numbers."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def _numbers(value: object, count: int) -> tuple[float, ...] | None:

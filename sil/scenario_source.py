@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from sil.scenario_errors import Path, Problem, ScenarioInvalid, UnknownScenario, Where, shown
+from sil.scenario_errors import Path, Problem, ScenarioInvalid, UnknownScenario, Where, printable, shown
 from sil.scenario_yaml import read_mapping, read_value
-from sil.scenarios import built_in_file, list_scenarios
+from sil.scenarios import built_in_file, is_file, list_scenarios
 
 MOST_BYTES = 1_000_000
 # Keys that may be written short: `link: udp` is `link: {url: udp}`.
@@ -84,7 +84,7 @@ def _find(name_or_path: str, directory: FilePath) -> FilePath:
     if built_in is not None:
         return built_in
     file = directory / name_or_path
-    if file.is_file():
+    if is_file(file):
         return file
     raise UnknownScenario(name_or_path, [info.name for info in list_scenarios()])
 
@@ -108,7 +108,7 @@ def _override(source: Source, sets: Sequence[str]) -> Source:
     into_lists: list[tuple[Path, Any, Where]] = []
     for text in sets:
         key, equals, value_text = text.partition("=")
-        where = Where(f"--set {key}", 0)
+        where = Where("--set " + ".".join(printable(part) for part in key.split(".")), 0)
         if not equals or not all(key.split(".")):
             raise ScenarioInvalid([Problem("--set", repr(text), "KEY=VALUE, such as law.form=float", "no KEY=")])
         value = read_value(value_text, where.file)

@@ -14,6 +14,8 @@ import yaml
 
 from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of
 
+MOST_LEVELS = 12
+MOST_VALUES = 100_000  # an alias stands for all that it names, so a short text may mean many
 MOST_DIGITS = 400  # a longer number is text: no key takes it, and Python refuses it
 NUMBER_INT = re.compile(r"[-+]?[0-9]+|0x[0-9a-fA-F]+|0o[0-7]+")
 NUMBER_FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -57,12 +59,30 @@ def _compose(text: str, file: str) -> yaml.Node | None:
         raise ScenarioInvalid([Problem(_place(file, line), "YAML", "valid YAML", reason, line)]) from None
     except yaml.YAMLError as error:
         raise ScenarioInvalid([Problem(file, "YAML", "valid YAML", " ".join(str(error).split()))]) from None
+    except RecursionError:
+        line = _too_deep(text)
+        expected = f"at most {MOST_LEVELS} levels"
+        raise ScenarioInvalid([Problem(_place(file, line), "YAML", expected, "a deeper nesting", line)]) from None
     return node
 
 
+def _too_deep(text: str) -> int:
+    """The line where the first value stands that is more than MOST_LEVELS deep."""
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.BaseLoader):
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MOST_LEVELS:
+            return event.start_mark.line + 1 if event.start_mark else 1
+    return 1
+
+
 def _plain(node: yaml.Node, path: Path, file: str, where: dict[Path, Where]) -> Any:
-    if len(path) > 12:
-        raise ScenarioInvalid([_problem(node, path, file, "at most 12 levels", "a deeper nesting or an alias cycle")])
+    if len(path) > MOST_LEVELS:
+        got = "a deeper nesting or an alias cycle"
+        raise ScenarioInvalid([_problem(node, path, file, f"at most {MOST_LEVELS} levels", got)])
+    if len(where) > MOST_VALUES:
+        expected = f"at most {MOST_VALUES} values"
+        raise ScenarioInvalid([_problem(node, path[:1], file, expected, "more, aliases written out")])
     if isinstance(node, yaml.MappingNode):
         return _mapping(node, path, file, where)
     where[path] = _where(node, file)

@@ -12,13 +12,18 @@ from protocol.events import name_of
 from sil import mcap_file
 from sil.metrics import AXIS_NAMES, NEVER_SETTLED, SETTLING, as_json, judge, measure
 from sil.plain import plain
-from sil.runs import Run
+from sil.runs import Run, readable
 
 _TYPES = {1: "CONFIG", 2: "SAMPLE", 3: "COMMAND", 4: "TELEMETRY", 5: "EVENT"}
 
 
 def info(run: Run) -> dict[str, Any]:
-    """All facts of a run as plain JSON values (numbers that do not exist are null)."""
+    """All facts of a run as plain JSON values (numbers that do not exist are null). Raises RunError."""
+    with readable(run.path):
+        return _facts(run)
+
+
+def _facts(run: Run) -> dict[str, Any]:
     metrics = measure(run)
     end = run.end
     content = {

@@ -26,7 +26,15 @@ def list_scenarios() -> tuple[ScenarioInfo, ...]:
 def built_in_file(name: str) -> Path | None:
     """The file of the built-in scenario `name`, None if there is none of that name."""
     file = DIRECTORY / f"{name}.yaml"
-    return file if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name) and file.is_file() else None
+    return file if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name) and is_file(file) else None
+
+
+def is_file(path: Path) -> bool:
+    """A file is there and may be looked at. What no file can be called (too long a name) is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def _about(file: Path) -> str:

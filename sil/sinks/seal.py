@@ -19,6 +19,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import struct
 import time
 from collections.abc import Iterator
 from importlib.metadata import version
@@ -38,6 +39,7 @@ CHUNK_BYTES = 256 * 1024  # the grain of seeking in a viewer
 REORDER_TICKS = 512  # a record may be journalled this many ticks late: twice what sil.answers remembers
 TRUNCATED = "truncated"  # the `end` reason of a run whose journal has no END
 LIBRARIES = ("mcap", "lz4", "foxglove-schemas-protobuf", "protobuf", "numpy")
+_UNREADABLE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
 _TO_TIMING = frozenset((Kind.HOST, Kind.TIMING, Kind.HOUSEKEEPING))
 
 
@@ -65,7 +67,7 @@ class SealReport(NamedTuple):
 def seal(run_dir: str | os.PathLike[str]) -> SealReport:
     """Write run.mcap and timing.mcap beside run.journal; each appears complete under its name or not at all.
 
-    Raises SealError or JournalError (no journal, not a journal, no META, disk full).
+    Raises SealError or JournalError (no journal, not a journal, no META, records that make no sense, disk full).
     """
     started = time.perf_counter()
     folder = Path(run_dir)
@@ -77,6 +79,8 @@ def seal(run_dir: str | os.PathLike[str]) -> SealReport:
             sealing.all()
     except OSError as error:
         raise SealError(f"{folder}: cannot write the log: {error.strerror or error}") from error
+    except _UNREADABLE as error:  # every CRC is right
+        raise SealError(f"{reader.path}: written by another version, or damaged: {repr(error)[:200]}") from error
     with open(run_path, "rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
     end = sealing.end
@@ -218,7 +222,7 @@ class _Sealing:
         elif record.kind == Kind.HOST:
             self.timing.host({**content, "sealed_with": {name: version(name) for name in LIBRARIES}})
         else:
-            self._end = content
+            self._end = {**content, "reason": str(content["reason"]), "ticks": int(content["ticks"])}
 
 
 def _committed(reader: JournalReader) -> Iterator[Record]:

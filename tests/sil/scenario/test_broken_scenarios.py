@@ -39,6 +39,27 @@ BROKEN: dict[str, tuple[str, str, int, str, str]] = {
     "number instead of truth": ("law: {}\nexpect_missed: 1\n", "expect_missed", 2, "true or false", "1"),
     "infinite duration": ("duration_s: .inf\n", "duration_s", 1, "a finite number in s", "inf"),
     "key given twice": ("seed: 1\nperiod_s: 0.5\nseed: 2\n", "seed", 3, "each key once", "first in line 1"),
+    "number beyond float64 among the angles": (
+        "plant:\n  initial: {attitude_deg: [" + "9" * 399 + ", 0, 0]}\n",
+        "plant.initial.attitude_deg", 2, "3 numbers in deg", "[999",
+    ),
+    "parameter beyond float64": (
+        "law: {name: mrac, params: {c2_pole: " + "9" * 399 + "}}\n", "law.params.c2_pole", 1, "from 0 to 0.999", "999",
+    ),
+    "name of a file that no file can have": (
+        "board: none\nschedule: " + "a" * 5000 + "\n", "schedule", 2, "a CSV file that exists", "'aaa",
+    ),
+    "user law in a file that no file can be": (
+        "law: {name: ./" + "a" * 5000 + ".py:Law}\n", "law.name", 1, "a file that exists", "./aaa",
+    ),
+    "extends what no file can be called": ("extends: " + "a" * 5000 + "\n", "extends", 1, "one of", "'aaa"),
+    "nesting without end": ("seed: 1\na: " + "[" * 3000 + "\n", "YAML", 2, "at most 12 levels", "a deeper nesting"),
+    "key with a line break": ('"a\\nb": 1\n', "a\\nb", 1, "known: ", "unknown key"),
+    "a thousand million laughs": (
+        "a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n"
+        + "".join(f"a{n}: &a{n} [{', '.join(['*a' + str(n - 1)] * 10)}]\n" for n in range(1, 9)),
+        "a4", 1, "at most 100000 values", "aliases",
+    ),
     "broken YAML": ("seed: 1\nlaw: {name: pd\n", "YAML", 3, "valid YAML", "flow mapping"),
     "list at the top": ("- seed\n", "scenario", 1, "a mapping of keys", "a list"),
     "law that does not exist": ("law:\n  name: mrca\n", "law.name", 2, "did you mean mrac?", "'mrca'"),
