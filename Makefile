@@ -36,11 +36,6 @@ golden: $(VENV)/.installed
 	$(BIN)/python -m tools.make_vectors
 	$(BIN)/python -m tools.spec_tables --write
 
-# The C headers that the Python tables give, and the images that ship; CI holds both against what is committed.
-firmware: $(VENV)/.installed
-	$(BIN)/python -m tools.firmware_headers --write
-	$(MAKE) -C firmware images PYTHON=$(abspath $(BIN))/python
-
 # The C side of what Python says, and the images that ship: after an edit of firmware/ or of a table it is made from.
 firmware: $(VENV)/.installed
 	$(BIN)/python -m tools.firmware_headers --write

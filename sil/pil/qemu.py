@@ -10,6 +10,7 @@ import argparse
 import os
 import select
 import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,7 @@ NAME = "qemu"
 MACHINES = {"mps2-an386": "mps2-an386", "stm32f405": "netduinoplus2"}  # chip: what QEMU calls a board with it
 IMAGES = Path(__file__).resolve().parents[2] / "firmware" / "images"
 REMEDY = "build it with `make firmware`"
+END_S = 2.0
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -74,10 +76,18 @@ def _watch(qemu: Qemu, line: int, wake: int) -> int:
                 return 0
             for event in qemu.qmp.take_events():
                 _tell(qemu, event)
-    except QmpError:
-        code = qemu.process.wait()
-        words = qemu.last_words()
-        return fail(f"{NAME}: it ended with {_describe(code)}{': ' if words else ''}{words}", EXIT_LINK)
+    except QmpError as error:
+        return fail(f"{NAME}: {_why(qemu, error)}", EXIT_LINK)
+
+
+def _why(qemu: Qemu, error: QmpError) -> str:
+    """What became of QEMU: its end, which is a moment behind that of its channel; of one that lives on, the error."""
+    try:
+        code = qemu.process.wait(END_S)
+    except subprocess.TimeoutExpired:
+        return str(error)
+    words = qemu.last_words()
+    return f"it ended with {_describe(code)}{': ' if words else ''}{words}"
 
 
 def _plug_pulled(qemu: Qemu, wake: int) -> bool:

@@ -12,6 +12,7 @@ import shutil
 import signal
 import socket
 import subprocess
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -60,7 +61,7 @@ class Qemu:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE,
                 pass_fds=[theirs.fileno()],
-                preexec_fn=_die_with_parent,
+                preexec_fn=partial(_die_with, os.getpid()),
             )
         self.qmp = Qmp(ours)
         try:
@@ -101,8 +102,8 @@ def _command(image: Path, machine: str, serial_path: str, qmp_fd: int) -> list[s
     return [PROGRAM, "-M", machine, "-kernel", str(image), *quiet, *control, *uart]
 
 
-def _die_with_parent() -> None:
-    """Between fork and exec: whatever kills the parent kills QEMU, too."""
+def _die_with(parent: int) -> None:
+    """Between fork and exec: whatever kills the parent kills QEMU, too. A parent may be process 1 of a container."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
-    if os.getppid() == 1:
+    if os.getppid() != parent:
         os._exit(0)

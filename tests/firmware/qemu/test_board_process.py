@@ -9,17 +9,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
-from powered import need_qemu
+from powered import Powered, need_qemu
 
 from protocol.frames import Type
 from protocol.links import open_link
 from protocol.port import Port
 from sil.boards import BoardOrder
 from sil.boards.qemu import QemuBoard
-from sil.pil.qemu_machine import PROGRAM
+from sil.pil.qemu import _watch
+from sil.pil.qemu_machine import PROGRAM, _die_with
 from sil.trouble import LinkFailure, SilError, UsageError
 from tools.firmware_image import IMAGES
 
@@ -95,6 +97,29 @@ def test_a_qemu_that_dies_is_told_in_one_line(launched):
     os.kill(launched.qemu_pid(), signal.SIGKILL)
     assert launched.said().splitlines()[-1] == "qemu: it ended with signal 9"
     assert launched.process.returncode == 3
+
+
+def test_a_qemu_that_lives_on_but_is_silent_is_told_too(monkeypatch, capsys):
+    """Its channel gives up after a while; to wait for its end would be to wait for ever."""
+    monkeypatch.setattr("sil.pil.qmp.ANSWER_S", 0.5)
+    monkeypatch.setattr("sil.pil.qemu.END_S", 0.1)
+    reader, writer = os.pipe()
+    with Powered("mps2-an386") as board:
+        board.boot_hello()
+        line = os.open(board.link.peer_url.removeprefix("serial://"), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        os.kill(board.qemu.process.pid, signal.SIGSTOP)
+        os.write(writer, bytes((signal.SIGUSR1,)))
+        assert _watch(board.qemu, line, reader) == 3
+    for fd in (line, reader, writer):
+        os.close(fd)
+    assert capsys.readouterr().err == "qemu: QMP: no answer within 0.5 s\n"
+
+
+@pytest.mark.parametrize(("parent", "says"), [(os.getpid, "here\n"), (lambda: 1, "")])
+def test_qemu_starts_under_its_parent_and_under_nobody_else(parent, says):
+    """Compared with the parent's number, not with 1: in a container the parent may well be process 1."""
+    done = subprocess.run(["echo", "here"], preexec_fn=partial(_die_with, parent()), capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, says)
 
 
 def test_the_reset_button_resets_and_says_so(launched):
