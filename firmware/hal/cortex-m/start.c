@@ -18,7 +18,7 @@ __attribute__((section(".noinit"), used)) volatile struct boot_record boot_recor
 static volatile int64_t milliseconds;
 static uint32_t counts_per_us;
 
-static void record(uint32_t exception, uint32_t pc, uint32_t status) {
+void boot_note(uint32_t exception, uint32_t pc, uint32_t status) {
     boot_record.exception = exception;
     boot_record.pc = pc;
     boot_record.status = status;
@@ -28,7 +28,7 @@ static void count_boot(void) {
     if (boot_record.magic != BOOT_MAGIC) {
         boot_record.magic = BOOT_MAGIC;
         boot_record.boots = 0u;
-        record(0u, 0u, 0u);
+        boot_note(0u, 0u, 0u);
     }
     boot_record.boots += 1u;
 }
@@ -55,7 +55,7 @@ _Noreturn void on_reset(void) {
     for (volatile uint32_t *word = bss_start; word < bss_end; word++) *word = 0u;
     count_boot();
     (void)main();
-    record(1u, 0u, 0u);
+    boot_note(1u, 0u, 0u);
     reset();
 }
 
@@ -63,7 +63,7 @@ _Noreturn void on_reset(void) {
 __attribute__((used)) static void note(const uint32_t *frame) {
     uint32_t exception;
     __asm volatile("mrs %0, ipsr" : "=r"(exception));
-    record(exception, frame ? frame[6] : 0u, SCB_CFSR);
+    boot_note(exception, frame ? frame[6] : 0u, SCB_CFSR);
 }
 
 __attribute__((used)) static _Noreturn void note_and_reset(const uint32_t *frame) {

@@ -39,6 +39,9 @@ _Static_assert(HSE_MHZ >= 4u && HSE_MHZ <= 26u, "the crystal of an STM32F405 has
 #define APB1_PWR (1u << 28)
 #define RCC_APB2_ENABLE REGISTER(0x40023844u)
 #define APB2_USART1 (1u << 4)
+#define RCC_RESETS REGISTER(0x40023874u) /* why there were resets, until that is forgotten */
+#define RESETS_BY_IWDG (1u << 29)
+#define RESETS_FORGET (1u << 24)
 
 #define PWR_CR REGISTER(0x40007000u)
 #define PWR_SCALE_1 (1u << 14) /* what 168 MHz needs */
@@ -167,6 +170,12 @@ static void watchdog_start(void) {
     IWDG_KEY = KEY_KICK;
 }
 
+/* This watchdog bites without a warning: that it did is seen afterwards only, and where the firmware hung nobody can tell. */
+static void watchdog_note(void) {
+    if ((RCC_RESETS & RESETS_BY_IWDG) != 0u) boot_note(BOOT_WATCHDOG, 0u, 0u);
+    RCC_RESETS |= RESETS_FORGET;
+}
+
 const hal *hal_start(void) {
     static const hal this_chip = {
         .now = clock_now,
@@ -179,6 +188,7 @@ const hal *hal_start(void) {
         .health = &health,
     };
     watchdog_start();
+    watchdog_note();
     uint32_t core_hz = core_start();
     clock_start(core_hz);
     usart_start(core_hz == PLL_HZ ? PLL_HZ / 2u : core_hz);

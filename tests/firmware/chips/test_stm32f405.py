@@ -6,6 +6,7 @@ reference manual (RM0090); whether the silicon agrees, only silicon can tell.
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from tools.firmware_image import IMAGES, build
 
 FLASH = 0x08000000
 RCC_CR, RCC_PLL, RCC_CFGR = 0x40023800, 0x40023804, 0x40023808
+RCC_RESETS, BY_IWDG, BY_SOFTWARE, FORGET = 0x40023874, 1 << 29, 1 << 28, 1 << 24
 FLASH_ACR = 0x40023C00
 USART_STATUS, USART_DATA, USART_DIVIDER = 0x40011000, 0x40011004, 0x40011008
 IWDG_KEY, IWDG_PRESCALER, IWDG_RELOAD = 0x40003000, 0x40003004, 0x40003008
@@ -129,6 +131,20 @@ def test_the_watchdog_runs_before_anything_can_hang_and_is_kicked_every_round():
     for rounds in range(1, 4):
         chip.bare.run_until_it_waits()
         assert chip.written.count((IWDG_KEY, KICK)) == kicks + rounds
+
+
+@pytest.mark.parametrize(
+    ("resets", "incident"), [(BY_IWDG, (2, 0, 0)), (BY_SOFTWARE, (3, 0x800, 7)), (0, (3, 0x800, 7))]
+)
+def test_that_the_watchdog_has_bitten_is_kept(resets, incident):
+    """It gives no warning (RM0090, 7.3.21): an incident that the firmware noted by itself stays, unless it was this."""
+    chip = Chip()
+    record = chip.bare.symbols["boot_record"]
+    chip.bare.uc.mem_write(record, struct.pack("<5I", 0xB0A2D001, 4, 3, 0x800, 7))
+    chip.values[RCC_RESETS] = resets
+    chip.boot()
+    assert struct.unpack("<5I", chip.bare.uc.mem_read(record, 20)) == (0xB0A2D001, 5, *incident)
+    assert chip.last(RCC_RESETS) & FORGET
 
 
 @pytest.mark.parametrize("error", [OVERRUN, NOISE, FRAMING])
