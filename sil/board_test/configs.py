@@ -14,7 +14,7 @@ from protocol.words import INT32_MAX
 from sil.board_test.bench import Bench
 from sil.board_test.examinee import Examinee
 from sil.board_test.made import UNKNOWN_LAW, cut, sample, unknown_law, words_of
-from sil.board_test.outcome import Failed, called, expect, listed, passed
+from sil.board_test.outcome import Failed, called, expect, judged, listed, passed
 from sil.doctor.findings import Finding
 
 INT32_MIN = -(2**31)
@@ -146,7 +146,7 @@ def limits(at: Examinee) -> Finding:
         want, got = at.reference.open(words), at.bench.open(words)
         if want != got:
             wrong.append(f"{name}: expected {_said(want)}, got {_said(got)}")
-    return _judged(wrong, f"{len(cases)} CONFIGs, READY and its hash as of the reference", len(cases))
+    return judged(wrong, f"{len(cases)} CONFIGs, READY and its hash as of the reference", cases=len(cases))
 
 
 def _limits(table: LawTable, with_common: bool) -> Iterator[tuple[str, tuple[int, ...]]]:
@@ -184,13 +184,7 @@ def _ready_answers(at: Examinee, cases: Sequence[Case]) -> Finding:
         got = at.bench.open(case.words)
         if (want := _deserved(case)) != got:
             wrong.append(f"{case.name}: expected {_said(want)}, got {_said(got)}")
-    return _judged(wrong, f"{len(cases)} CONFIGs, status and index of each", len(cases))
-
-
-def _judged(wrong: Sequence[str], said: str, count: int) -> Finding:
-    if wrong:
-        raise Failed(f"{wrong[0]}{f'; and {len(wrong) - 1} more' if len(wrong) > 1 else ''}", wrong[1:])
-    return passed(said, cases=count)
+    return judged(wrong, f"{len(cases)} CONFIGs, status and index of each", cases=len(cases))
 
 
 def _deserved(case: Case) -> Ready:

@@ -7,6 +7,8 @@ invents and any scenario of the user's, and leaves no file that has to be renewe
 
 from __future__ import annotations
 
+import os
+import signal
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -20,7 +22,7 @@ from protocol.links import open_link
 from protocol.links.serial import SerialLink
 from sil.board_test.bench import Bench, Patience
 from sil.board_test.outcome import Silent, Skipped
-from sil.boards import BOARDS, BoardHost, BoardOrder, plug_in
+from sil.boards import BOARDS, WITHOUT_TIMER, BoardHost, BoardOrder, plug_in
 from sil.doctor.device import Device
 from sil.doctor.findings import Surroundings
 from sil.doctor.link import Examination, link_url
@@ -28,6 +30,7 @@ from sil.doctor.talk import Talk
 from sil.doctor.verdicts import FAULTS
 from sil.trouble import LinkFailure, SilError, UsageError
 
+WITH_BUTTON = WITHOUT_TIMER  # emulated processors, whose processes take SIGUSR1 for their reset button
 KINDS = tuple(kind for kind in BOARDS if kind not in ("inproc", "wired"))  # inproc is the reference itself
 FLIGHTS = ("pd-root-locus", "mrac-rs232", "appc-rs232")
 
@@ -39,7 +42,7 @@ class Order:
     """What to test and how. target: a kind of board that is started for it, or the URL of one that runs.
 
     link: of a board that is started. flights: scenarios whose first `ticks` ticks it has to fly. reset: ask for the
-    reset button. drift_s: how long the board's timer is watched.
+    reset button, and it has to be pressed; reset_offered: ask, and it may be. drift_s: how long its timer is watched.
     """
 
     target: str
@@ -50,6 +53,7 @@ class Order:
     ticks: int = 200
     exchanges: int = 300
     reset: bool = False
+    reset_offered: bool = False
     reset_within_s: float = 30.0
     drift_s: float = 10.0
     patience: Patience = field(default_factory=Patience)
@@ -108,6 +112,13 @@ class Examinee:
         """The same once more, with a board of ours that has forgotten everything."""
         self.unplug()
         self.plug()
+
+    def press(self) -> bool:
+        """The reset button of an emulated processor; False where there is none that we can reach."""
+        if self.order.target not in WITH_BUTTON or self._host is None or self._host.pid is None:
+            return False
+        os.kill(self._host.pid, signal.SIGUSR1)
+        return True
 
     def unplug(self) -> None:
         """STOP, close the link, end what we started."""

@@ -29,7 +29,7 @@ from sil.trouble import SilError, UsageError
 
 LOST_EVERY, LOST_IN_A_ROW = 23, 2  # SAMPLEs: two of every 23
 NOISE_DEG = 0.02
-BARS, BAR_WIDTH = 10, 40
+BARS, BAR_WIDTH = 10, 26
 HEAVIEST = ("mrac", "appc", "pd")
 
 

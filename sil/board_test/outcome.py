@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from protocol import frames
@@ -17,6 +17,7 @@ USED = {
     frames.RESTARTED: "restarted",
 }
 MOST_SHOWN = 5  # of a list of frames
+MOST_LINES = 4  # of what is wrong
 
 
 class Failed(Exception):
@@ -63,6 +64,14 @@ def listed(names: Iterable[str]) -> str:
     texts = list(names)
     more = f" and {len(texts) - MOST_SHOWN} more" if len(texts) > MOST_SHOWN else ""
     return ", ".join(texts[:MOST_SHOWN]) + more or "nothing"
+
+
+def judged(wrong: Sequence[str], said: str, **data: Any) -> Finding:
+    """The finding of a check of many cases, each of which is right or in `wrong`. Raises Failed; JSON has all of it."""
+    if wrong:
+        more = f"; and {len(wrong) - 1} more" if len(wrong) > 1 else ""
+        raise Failed(f"{wrong[0]}{more}", wrong[1:MOST_LINES], {"wrong": list(wrong), **data})
+    return passed(said, **data)
 
 
 def expect(what: str, expected: Any, got: Any) -> None:

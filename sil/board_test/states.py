@@ -15,7 +15,7 @@ from protocol.law_tables import LawTable
 from sil.board_test.bench import Bench, fresh_nonce
 from sil.board_test.examinee import Examinee
 from sil.board_test.made import not_for_a_board, part_of, refused, sample, unknown_law, whole, words_of
-from sil.board_test.outcome import Failed, called, expect, listed, passed
+from sil.board_test.outcome import called, expect, judged, listed
 from sil.doctor.findings import Finding
 
 TOLD = (Type.HELLO, Type.READY, Type.COMMAND)  # what the table speaks of; TELEMETRY and EVENT have checks of their own
@@ -164,9 +164,7 @@ def _check(at: Examinee, state: str) -> Finding:
         at.tell(f"{state}: {name} ({number + 1} of {len(names)})")
         if said := _cell(at.bench, at.law, state, name, row[name]):
             wrong.append(said)
-    if wrong:
-        raise Failed(f"{wrong[0]}{f'; and {len(wrong) - 1} more' if len(wrong) > 1 else ''}", wrong[1:])
-    return passed(f"{len(names)} events, the answer and the state behind each")
+    return judged(wrong, f"{len(names)} events, the answer and the state behind each", events=len(names))
 
 
 def _sent_in(at: Examinee, state: str) -> dict[str, Sent]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sil.trouble import EXIT_LINK, EXIT_OK
+from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK
 from sil.verbs import completion
 from sil.verbs.options import RESULT_PANEL, JsonOption, print_json
 
@@ -89,7 +89,7 @@ def board_test(
         bool | None,
         typer.Option(
             "--reset/--no-reset",
-            help="Ask for the board's reset button. Default: where somebody is at the terminal.",
+            help="Ask for the board's reset button, which has to be pressed. Default: ask, where somebody is there.",
             show_default=False,
             rich_help_panel=CHECKS_PANEL,
         ),
@@ -132,22 +132,35 @@ def board_test(
     from sil.board_test.show import Sheet, as_dict, as_junit, passed
     from sil.report.junit_file import JunitFile
 
-    asks = reset if reset is not None else sys.stdin.isatty() and sys.stderr.isatty() and not as_json
-    flights = tuple(flight or FLIGHTS)
-    order = Order(board, link, tuple(only or ()), tuple(skip or ()), flights, ticks, exchanges, asks, drift_s=drift_s)
+    somebody = sys.stdin.isatty() and sys.stderr.isatty() and not as_json
+    order = Order(
+        board,
+        link,
+        tuple(only or ()),
+        tuple(skip or ()),
+        tuple(flight or FLIGHTS),
+        ticks,
+        exchanges,
+        reset=reset is True,
+        reset_offered=reset is None and somebody,
+        drift_s=drift_s,
+    )
     began_s = time.monotonic()
-    with JunitFile(junit, "board-test", about=THE_TEST) as page:
-        sheet = None if as_json else Sheet()
-        tested, interrupted = _tested(order, sheet)
-        took_s = time.monotonic() - began_s
-        if as_json:
-            print_json(as_dict(tested, board, took_s))
-        elif sheet is not None and not interrupted:
-            sheet.last_line(tested, board, took_s)
-        if interrupted:
-            raise KeyboardInterrupt
-        if junit is not None:
+    try:
+        with JunitFile(junit, "board-test", about=THE_TEST) as page:
+            sheet = None if as_json else Sheet()
+            tested, interrupted = _tested(order, sheet)
+            took_s = time.monotonic() - began_s
+            if as_json:
+                print_json(as_dict(tested, board, took_s))
+            if interrupted:
+                raise KeyboardInterrupt
+            if sheet is not None:
+                sheet.last_line(tested, board, took_s)
             page.write(as_junit(tested, board))
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return EXIT_INTERRUPTED
     return EXIT_OK if passed(tested) else EXIT_LINK
 
 

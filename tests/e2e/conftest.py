@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from cables import Cable
 from subprocesses import Cli
 
 
@@ -27,3 +30,17 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
         return made[arguments]
 
     return run
+
+
+@pytest.fixture
+def cable() -> Iterator[Cable]:
+    """A cable with a real controller process on it."""
+    joined = Cable()
+    command = [sys.executable, "-P", "-m", "firmware_sim", "--link", f"serial://{joined.board}"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as board:
+        assert board.stdout is not None
+        assert board.stdout.readline().startswith(b"listening")
+        joined.start()
+        yield joined
+        board.terminate()
+    joined.close()

@@ -8,77 +8,15 @@ import select
 import signal
 import subprocess
 import sys
-import threading
-import tty
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from cables import Cable
 from subprocesses import Cli, alive, children_of
 
 from protocol import frames
-from protocol.codec import StreamDecoder
 
 CHECKS = ["python", "packages", "dependencies", "compiled code", "processors", "kernel", "timers", "hypervisor"]
-
-
-class Cable:
-    """Two ptys whose far sides are joined: what goes into `lab` comes out of `board`, and the other way round."""
-
-    def __init__(self) -> None:
-        self._masters: list[int] = []
-        self._held: list[int] = []
-        paths = []
-        for _ in range(2):
-            master, slave = os.openpty()
-            tty.setraw(slave)
-            self._masters.append(master)
-            self._held.append(slave)
-            paths.append(os.ttyname(slave))
-        self.lab, self.board = paths
-        self.to_board = StreamDecoder()
-        self.types: list[int] = []
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._relay)
-
-    def start(self) -> None:
-        """Let go of the near sides, which somebody has to have opened by now or will soon."""
-        for slave in self._held:
-            os.close(slave)
-        self._thread.start()
-
-    def _relay(self) -> None:
-        lab, board = self._masters
-        while not self._over.is_set():
-            for master in select.select(self._masters, [], [], 0.02)[0]:
-                try:
-                    data = os.read(master, 65536)
-                except OSError:  # nobody has the near side open at the moment
-                    self._over.wait(0.005)
-                    continue
-                if master == lab:
-                    self.types += [packet[1] for packet in self.to_board.feed(data)]
-                os.write(board if master == lab else lab, data)
-
-    def close(self) -> None:
-        self._over.set()
-        self._thread.join()
-        for master in self._masters:
-            os.close(master)
-
-
-@pytest.fixture
-def cable() -> Iterator[Cable]:
-    """A cable with a real controller process on it."""
-    joined = Cable()
-    command = [sys.executable, "-P", "-m", "firmware_sim", "--link", f"serial://{joined.board}"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as board:
-        assert board.stdout is not None
-        assert board.stdout.readline().startswith(b"listening")
-        joined.start()
-        yield joined
-        board.terminate()
-    joined.close()
 
 
 def test_this_machine(cli: Cli) -> None:

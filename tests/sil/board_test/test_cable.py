@@ -8,7 +8,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import pytest
 
@@ -30,17 +30,42 @@ from sil.trouble import UsageError
 QUICK = Patience(hello_s=0.4, answer_s=0.4, quiet_s=0.005)
 
 
+class Reboots(Board):
+    """A board with a reset button."""
+
+    pressed = False
+
+    def press(self) -> None:
+        self.pressed = True
+
+    def look(self) -> None:
+        """Its main loop comes round."""
+        if self.pressed:
+            self.pressed = False
+            self._forget()
+            self._nonce = None
+            self.announce()
+
+
+class Plugged(NamedTuple):
+    """Path of a serial port with a right board on it, types of the frames that reached the board, the board."""
+
+    path: str
+    heard: list[int]
+    board: Reboots
+
+
 @pytest.fixture
-def port() -> Iterator[tuple[str, list[int]]]:
-    """(path of a serial port with a right board on it, types of the frames that reach the board)."""
+def port() -> Iterator[Plugged]:
     heard: list[int] = []
     near = open_link("pty", listen=False)  # the board holds the master here, the lab opens the port
     board_port = Port(near, tap=lambda way, packet: heard.append(packet[1]) if way == "rx" else None)
-    board = Board(board_port, HostHal(board_port))
+    board = Reboots(board_port, HostHal(board_port))
     over = threading.Event()
 
     def live() -> None:
         while not over.is_set():
+            board.look()
             try:
                 packet = board_port.receive(0.02)
             except LinkError:
@@ -51,7 +76,7 @@ def port() -> Iterator[tuple[str, list[int]]]:
 
     thread = threading.Thread(target=live)
     thread.start()
-    yield near.url.removeprefix("serial://"), heard
+    yield Plugged(near.url.removeprefix("serial://"), heard, board)
     over.set()
     thread.join()
     near.close()
@@ -61,8 +86,8 @@ def statuses(order: Order) -> dict[str, tuple[str, str]]:
     return {each.finding.check: (each.finding.status, each.finding.found) for each in examine(order, lambda text: None)}
 
 
-def test_a_board_on_a_port_is_tested_and_left_without_a_session(port: tuple[str, list[int]]) -> None:
-    path, heard = port
+def test_a_board_on_a_port_is_tested_and_left_without_a_session(port: Plugged) -> None:
+    path, heard, _ = port
     found = statuses(Order(path, only=("handshake", "baud", "reset"), patience=QUICK))
     assert {name: said for name, said in found.items() if said[0] == FAIL} == {}
     assert found["baud"] == (SKIPPED, "a pseudo-terminal has no baud rate")
@@ -71,8 +96,32 @@ def test_a_board_on_a_port_is_tested_and_left_without_a_session(port: tuple[str,
     assert Type.STOP in heard[-3:]
 
 
-def test_a_port_that_another_process_has_open_is_left_alone(port: tuple[str, list[int]], tmp_path: Path) -> None:
-    path, heard = port
+def test_a_reset_button_that_is_pressed_when_asked_for(port: Plugged) -> None:
+    asked: list[str] = []
+
+    def press(text: str) -> None:
+        asked.append(text)
+        port.board.press()
+
+    order = Order(port.path, only=("reset",), reset=True, reset_within_s=5.0, patience=QUICK)
+    found = {each.finding.check: each.finding for each in examine(order, lambda text: None, press)}
+    assert found["reset"].status == PASS, found["reset"].found
+    assert asked == ["press the board's reset button, within 5 s"]
+
+
+@pytest.mark.parametrize(("has_to", "status"), [(True, FAIL), (False, SKIPPED)])
+def test_a_reset_button_that_nobody_presses(port: Plugged, has_to: bool, status: str) -> None:
+    order = Order(
+        port.path, only=("reset",), reset=has_to, reset_offered=not has_to, reset_within_s=0.2, patience=QUICK
+    )
+    found = {each.finding.check: each.finding for each in examine(order, lambda text: None)}
+    assert found["reset"].status == status
+    assert "HELLO (nonce 0) within 0.2 s" in found["reset"].found
+    assert found["left"].status == PASS
+
+
+def test_a_port_that_another_process_has_open_is_left_alone(port: Plugged, tmp_path: Path) -> None:
+    path, heard, _ = port
     process = tmp_path / "proc" / "99999"
     (process / "fd").mkdir(parents=True)
     (process / "fd" / "3").symlink_to(path)
