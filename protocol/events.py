@@ -27,6 +27,11 @@ PLANT_NAN = 0x0105
 EPOCH_REBASED = 0x0108
 BOARD_RESTARTED = 0x0109
 DIVERGED = 0x010A
+LINK_DOWN = 0x0110
+LINK_UP = 0x0111
+BOARD_OFF = 0x0112
+BOARD_ON = 0x0113
+SETPOINT = 0x0114
 
 FIRST_LAB_CODE = 0x0100
 
@@ -75,6 +80,11 @@ _KINDS = (
     EventKind(EPOCH_REBASED, "EPOCH_REBASED", "woke more than a period late: the epoch moved", "tick", "us"),
     EventKind(BOARD_RESTARTED, "BOARD_RESTARTED", "the board said HELLO within a session", "tick", "restarts so far"),
     EventKind(DIVERGED, "DIVERGED", "attitude beyond the scenario's bound", "axis 0, 1, 2", "angle in 1e-3 deg"),
+    EventKind(LINK_DOWN, "LINK_DOWN", "the scenario disconnects the link", "tick", "ticks it lasts"),
+    EventKind(LINK_UP, "LINK_UP", "the link is connected again", "tick", "ticks it was down"),
+    EventKind(BOARD_OFF, "BOARD_OFF", "the scenario switches the board off", "tick", "ticks it lasts"),
+    EventKind(BOARD_ON, "BOARD_ON", "the board is on again, in a session of its own", "tick", "ticks it was off"),
+    EventKind(SETPOINT, "SETPOINT", "the scenario commands another attitude", "tick", "number in events, from 0"),
 )
 
 EVENTS = {kind.code: kind for kind in _KINDS}

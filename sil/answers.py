@@ -2,8 +2,8 @@
 
 A tick's answer is COMMAND(k) and the TELEMETRY and EVENT frames it announces. In lockstep `drain` waits for the whole
 answer; in real time it takes what is there. The modelled arrival alone decides whether a command is in time.
-Where the board restarts, what it has not answered stays unanswered, and a new session is opened (rejoin.py): in
-lockstep `drain` waits for it, too; a paced clock goes on, and its ticks are misses.
+Where the board restarts, unasked or as the scenario says, what it has not answered stays unanswered, and a new session
+is opened (rejoin.py): in lockstep `drain` waits for it, too; a paced clock goes on, and its ticks are misses.
 """
 
 from __future__ import annotations
@@ -75,8 +75,10 @@ class Answers:
         """SAMPLE(k), or in lockstep TICK(k) where the link does not deliver it (TICK is never faulted)."""
         tick = self._tick = sample.tick
         self.last_answer_ns = NO_ANSWER
-        if self._rejoin.under_way:
-            self._lost(tick)
+        if self._rejoin.switches_off(tick):
+            self._switched_off(tick)
+        if self._rejoin.under_way or self._rejoin.off(tick):
+            self._without_board(tick)
             return
         if self._rejoin.begins(tick):
             self._first = tick
@@ -200,6 +202,23 @@ class Answers:
         self._early.clear()
         self._should_use.clear()
         self._rejoin.restarted(max(self._tick, 0))
+
+    def _switched_off(self, tick: int) -> None:
+        """The scenario switches the board off before SAMPLE(tick). What it answered by the model has come by now."""
+        if self._followers:
+            self._window.incomplete(self._complete)
+        self._complete, self._followers = tick - 1, 0
+        self._early.clear()
+        self._should_use.clear()
+        self._rejoin.switch_off(tick)
+
+    def _without_board(self, tick: int) -> None:
+        """No session, no SAMPLE. A board that a planned restart should have brought back by now is the clock's miss."""
+        if self._rejoin.overdue and not self._rejoin.off(tick):
+            self._window.unanswered(tick)
+            self._complete = tick
+        else:
+            self._lost(tick)
 
     def _lost(self, tick: int) -> None:
         """No more answers up to `tick`: COMMANDs that are not here are misses, and no real ones."""

@@ -19,11 +19,15 @@ Row = tuple[int, int, int, int]  # tick, x, y, z in 2^-32 turn
 
 
 class Orders(NamedTuple):
-    """Everything the board is told: CONFIG words, and what both ends read out of them."""
+    """Everything the board is told: CONFIG words, and what both ends read out of them.
+
+    rows: the set-points; the board has them in CONFIG too, unless it takes them from each SAMPLE.
+    """
 
     table: LawTable
     words: tuple[int, ...]
     configuration: Configuration
+    rows: tuple[Row, ...]
 
 
 def row_at(rows: tuple[Row, ...], tick: int) -> tuple[int, int, int]:
@@ -57,9 +61,9 @@ def orders(scenario: Scenario) -> Orders:
         "setpoint_source": guidance.setpoint_source,
         **scenario.law_values(),
     }
-    rows = guidance_rows(scenario) if guidance.setpoint_source == "table" else ()
-    words = law_tables.config_words(table, values, rows)
-    return Orders(table, words, law_tables.parse_configuration(words, table))
+    rows = guidance_rows(scenario)
+    words = law_tables.config_words(table, values, rows if guidance.setpoint_source == "table" else ())
+    return Orders(table, words, law_tables.parse_configuration(words, table), rows)
 
 
 def guidance_rows(scenario: Scenario) -> tuple[Row, ...]:

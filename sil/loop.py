@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -61,12 +61,16 @@ class Loop:
         recorder: Recorder,
         clock: Clock,
         bound_deg: float | None = None,
+        planned: Iterable[tuple[int, int, int, int]] = (),
     ) -> None:
         self.timing, self.scales = timing, scales
         self.plant, self.actuator, self.sensors, self.setpoints = plant, actuator, sensors, setpoints
         self.board, self.commands, self.recorder, self.clock = board, commands, recorder, clock
         self.period_s = timing.period_ns * 1e-9
         self.bound_rad = None if bound_deg is None else math.radians(bound_deg)
+        self.planned: dict[int, list[tuple[int, int, int]]] = {}  # events (code, a, b) that the scenario asks for
+        for tick, *event in sorted(planned):
+            self.planned.setdefault(tick, []).append((event[0], event[1], event[2]))
         self.ticks_done = timing.first_tick
         self.account = Account()
         self.lateness_ns, self.causes = array("q"), array("B")  # of every wake-up of a paced run
@@ -176,6 +180,8 @@ class Loop:
         return Sample(k, self.setpoints(k), torque, momentum, acting.ack, 0, acting.source, valid, shown)
 
     def _record(self, k: int, motion: Motion, applied: Vector) -> None:
+        for event in self.planned.get(k, ()):
+            self.recorder.event(k, *event)
         self._notices(k)
         self.recorder.truth(motion, applied, self.setpoints(k), self.commands.acting.source, k)
         self.ticks_done = k + 1

@@ -8,7 +8,7 @@ lost (docs/ASSUMPTIONS.md).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from sil.scenario_sections import Guidance, Numbers3
@@ -23,11 +23,17 @@ class SetpointRow(NamedTuple):
     xyz_deg: Numbers3
 
 
-def setpoints(guidance: Guidance, period_s: float, ticks: int) -> tuple[SetpointRow, ...]:
-    """Rows for ticks 0..ticks-1: a change at t_s acts from the first tick not before it on; equal rows merge."""
+def setpoints(
+    guidance: Guidance, period_s: float, ticks: int, more: Sequence[SetpointRow] = ()
+) -> tuple[SetpointRow, ...]:
+    """Rows for ticks 0..ticks-1: a change at t_s acts from the first tick not before it on; equal rows merge.
+
+    more: rows beside the profile's; in a tick where both have one, it is theirs that counts.
+    """
+    profile = PROFILES[guidance.profile](guidance, period_s * ticks)
+    changes = [SetpointRow(math.ceil(t_s / period_s - 1e-9), xyz_deg) for t_s, xyz_deg in profile]
     rows: list[SetpointRow] = []
-    for t_s, xyz_deg in PROFILES[guidance.profile](guidance, period_s * ticks):
-        tick = math.ceil(t_s / period_s - 1e-9)
+    for tick, xyz_deg in sorted([*changes, *more], key=lambda row: row.tick):
         if tick >= ticks:
             break
         if rows and rows[-1].tick == tick:

@@ -12,7 +12,9 @@ from protocol import frames
 from protocol.channel import Channel, Clear
 from protocol.law_tables import ConfigError, refusal
 from protocol.links import LinkError
+from protocol.outages import Disconnected
 from protocol.port import Port
+from sil import timeline
 from sil.actuators import ACTUATORS
 from sil.answers import Answers
 from sil.boards import FIRMWARE, BoardHost, BoardOrder, plug_in
@@ -89,9 +91,16 @@ def assemble(
         clock = clock or new_clock(scenario.clock.mode, scenario.period_ns, scenario.clock.spin_us)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
-        return _with_board(scenario, clock, recorder, log, notify, wired, channel or Clear(scenario.link.baud))
+        return _with_board(scenario, clock, recorder, log, notify, wired, _channel(scenario, channel))
     except LinkError as error:
         raise LinkFailure(str(error)) from None
+
+
+def _channel(scenario: Scenario, good: Channel | None) -> Channel:
+    """The modelled wire of the scenario (or the one that was handed over), with the outages of its events."""
+    outages = timeline.outages(scenario.events, scenario.period_us, scenario.ticks)
+    good = good or Clear(scenario.link.baud)
+    return Disconnected(good, outages) if outages else good
 
 
 def law_orders(scenario: Scenario) -> Orders:
@@ -130,7 +139,8 @@ def _with_board(
             made.words, made.configuration.hash, WIRED_WITHIN_S if wired else HELLO_WITHIN_S, notify
         )
         rig.config_packets = tuple(packets)
-        rig.rejoin = Rejoin(rig.port, rig.session, scenario.restart_limit, recorder, notify)
+        planned = timeline.restarts(scenario.events, scenario.period_us, scenario.ticks)
+        rig.rejoin = Rejoin(rig.port, rig.session, scenario.restart_limit, recorder, notify, planned)
         rig.answers = loop.board = _answers(scenario, rig, recorder, channel)
         rig.loop = loop
     except LinkError as error:
@@ -217,7 +227,7 @@ def _scheduled(scenario: Scenario) -> Scheduled:
 def _loop(
     scenario: Scenario, clock: Clock, board: Counterpart, decides: Decides, recorder: Recorder, made: Orders | None
 ) -> Loop:
-    rows = made.configuration.rows if made is not None else ()
+    rows = made.rows if made is not None else ()
     delay = scenario.transport_delay_ticks if made is not None else 0
     return Loop(
         Timing(scenario.period_ns, delay, scenario.ticks),
@@ -231,6 +241,7 @@ def _loop(
         recorder,
         clock,
         scenario.metrics.diverged_deg,
+        timeline.notices(scenario.events, scenario.period_us, scenario.ticks),
     )
 
 

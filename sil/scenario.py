@@ -18,6 +18,8 @@ from sil import scenario_law as laws
 from sil.plants import PLANTS
 from sil.profiles import PROFILES, SetpointRow, setpoints
 from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of, one_of, shown
+from sil.scenario_events import Event
+from sil.scenario_events import findings as event_findings
 from sil.scenario_metrics import refused_metric
 from sil.scenario_sections import (
     Actuators,
@@ -39,6 +41,7 @@ from sil.scenario_sections import (
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
 from sil.scenarios import is_file
+from sil.timeline import setpoint_rows
 
 NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out")  # how it is run, not what is run
 MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
@@ -88,6 +91,8 @@ class Scenario(Section):
     """TELEMETRY in every so many ticks; 0: never"""
     expect_missed: bool = False
     """True: this scenario is meant to miss its deadlines, `sil check` accepts it."""
+    events: tuple[Event, ...] = ()
+    """What happens in mid-run on purpose."""
     metrics: Metrics = Metrics()
     require: tuple[Requirement, ...] = ()
     """What decides the verdict."""
@@ -143,8 +148,9 @@ class Scenario(Section):
         return laws.wire_values(self._table, self.law.params)
 
     def setpoints(self) -> tuple[SetpointRow, ...]:
-        """The guidance profile as rows (tick, set-point in deg)."""
-        return setpoints(self.guidance, self.period_s, self.ticks)
+        """The guidance profile, and the set-points among `events`, as rows (tick, set-point in deg)."""
+        more = setpoint_rows(self.events, self.period_us, self.ticks)
+        return setpoints(self.guidance, self.period_s, self.ticks, more)
 
     def file_of(self, key: str) -> FilePath | None:
         """The file that `schedule` or `law.name` names (without :CLASS), found from the file which says so."""
@@ -257,6 +263,7 @@ def _cross_problems(scenario: Scenario) -> Iterator[Problem]:
         _inertia,
         _torque_scale,
         _files,
+        _events,
     )
     for check in checks:
         yield from check(scenario)
@@ -343,6 +350,13 @@ def _files(scenario: Scenario) -> Iterator[Problem]:
     file = scenario.file_of("schedule")
     if file is None or not is_file(file):
         yield _problem(scenario, "schedule", "a CSV file that exists", scenario.schedule)
+
+
+def _events(scenario: Scenario) -> Iterator[Problem]:
+    if not scenario.ticks:
+        return
+    for path, expected, got in event_findings(scenario.events, scenario.board, scenario.period_us, scenario.ticks):
+        yield _problem(scenario, path, expected, got)
 
 
 def _problem(scenario: Scenario, key: str | Path, expected: str, got: object) -> Problem:

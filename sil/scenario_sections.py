@@ -49,13 +49,14 @@ def is_number(value: object) -> bool:
         return False
 
 
-def _numbers(value: object, count: int) -> tuple[float, ...] | None:
+def numbers_of(value: object, count: int) -> tuple[float, ...] | None:
+    """`count` finite numbers as floats; None where `value` is something else."""
     fits = isinstance(value, tuple) and len(value) == count and all(is_number(item) for item in value)
     return tuple(float(item) for item in value) if fits and isinstance(value, tuple) else None
 
 
 def _triple(value: object) -> object:
-    if (numbers := _numbers(value, 3)) is None:
+    if (numbers := numbers_of(value, 3)) is None:
         raise Expected("3 numbers")
     return numbers
 
@@ -63,7 +64,7 @@ def _triple(value: object) -> object:
 def _quaternion(value: object) -> object:
     if value is None:
         return None
-    numbers = _numbers(value, 4)
+    numbers = numbers_of(value, 4)
     if numbers is None or abs(math.hypot(*numbers) - 1.0) > 1e-6:
         raise Expected("4 numbers, scalar first, of norm 1")
     return numbers
@@ -77,23 +78,23 @@ def _limits(value: object) -> object:
 
 
 def _not_negative(value: object) -> object:
-    numbers = _numbers(value if isinstance(value, tuple) else (value,) * 3, 3)
+    numbers = numbers_of(value if isinstance(value, tuple) else (value,) * 3, 3)
     if numbers is None or min(numbers) < 0:
         raise Expected("a number not below 0, or 3 of them")
     return numbers
 
 
 def _one_or_three(value: object) -> object:
-    if (numbers := _numbers(value if isinstance(value, tuple) else (value,) * 3, 3)) is None:
+    if (numbers := numbers_of(value if isinstance(value, tuple) else (value,) * 3, 3)) is None:
         raise Expected("a number, or 3 of them")
     return numbers
 
 
 def _inertia(value: object) -> object:
-    diagonal = _numbers(value, 3)
+    diagonal = numbers_of(value, 3)
     if diagonal is not None:
         value = tuple(tuple(diagonal[i] if i == j else 0.0 for j in range(3)) for i in range(3))
-    rows = tuple(_numbers(row, 3) for row in value) if isinstance(value, tuple) else ()
+    rows = tuple(numbers_of(row, 3) for row in value) if isinstance(value, tuple) else ()
     if len(rows) != 3 or None in rows:
         raise Expected("3 numbers or 3 rows of 3 numbers")
     matrix = tuple(row for row in rows if row is not None)
@@ -107,7 +108,7 @@ def _inertia(value: object) -> object:
 def _interval(value: object) -> object:
     if value is None:
         return None
-    numbers = _numbers(value, 2)
+    numbers = numbers_of(value, 2)
     if numbers is None or numbers[0] > numbers[1]:
         raise Expected("2 numbers, the lower first")
     return numbers

@@ -6,7 +6,16 @@ from protocol import events
 from protocol.events import EVENTS
 
 ERRORS = frozenset((events.NAN, events.PLANT_NAN, events.DIVERGED, events.BOARD_RESTARTED))
-NOTES = frozenset((events.WATCHDOG_OFF, events.REFERENCE_RESTART, events.RECOVERED))
+NOTES = frozenset(
+    (
+        events.WATCHDOG_OFF,
+        events.REFERENCE_RESTART,
+        events.RECOVERED,
+        events.LINK_UP,
+        events.BOARD_ON,
+        events.SETPOINT,
+    )
+)
 OF_THE_HOST = frozenset((events.EPOCH_REBASED,))  # caused by this machine's clock alone: they go to timing.mcap
 
 

@@ -165,7 +165,7 @@ def test_broken_scenario_is_one_line(name: str, tmp_path: Path) -> None:
     shown = str(finding)
     assert "\n" not in shown
     assert shown.startswith(f"{tmp_path / 'broken.yaml'}:{line}: {key}: ")
-    assert len(shown) < len(str(tmp_path)) + 360
+    assert len(shown) < len(str(tmp_path)) + 380
 
 
 def test_several_faults_are_several_lines_in_the_order_of_the_file(tmp_path: Path) -> None:
