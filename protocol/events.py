@@ -32,6 +32,8 @@ LINK_UP = 0x0111
 BOARD_OFF = 0x0112
 BOARD_ON = 0x0113
 SETPOINT = 0x0114
+FAULT_BEGINS = 0x0115
+FAULT_ENDS = 0x0116
 
 FIRST_LAB_CODE = 0x0100
 
@@ -45,6 +47,9 @@ class EventKind(NamedTuple):
     a: str
     b: str
 
+
+_INSTRUMENT = "of (0 attitude sensor, 1 star tracker, 2 gyros, 3 wheels)"
+_FAULT = "kind (0 off, 1 stuck, 2 garbage, 3 wrong, 4 slow, 5 delayed, 6 intermittent)"
 
 _KINDS = (
     EventKind(SAMPLE_LOST, "SAMPLE_LOST", "tick stepped without a usable SAMPLE", "tick", "samples lost so far"),
@@ -85,6 +90,8 @@ _KINDS = (
     EventKind(BOARD_OFF, "BOARD_OFF", "the scenario switches the board off", "tick", "ticks it lasts"),
     EventKind(BOARD_ON, "BOARD_ON", "the board is on again, in a session of its own", "tick", "ticks it was off"),
     EventKind(SETPOINT, "SETPOINT", "the scenario commands another attitude", "tick", "number in events, from 0"),
+    EventKind(FAULT_BEGINS, "FAULT_BEGINS", "a fault of an instrument, on purpose", _INSTRUMENT, _FAULT),
+    EventKind(FAULT_ENDS, "FAULT_ENDS", "it works again", _INSTRUMENT, _FAULT),
 )
 
 EVENTS = {kind.code: kind for kind in _KINDS}

@@ -86,12 +86,12 @@ class Loop:
         motion = self.plant.motion(t_ns)
         if not is_finite(motion):
             raise PlantBroke(k)
-        applied = self._limited(acting, motion)
+        applied = self._limited(acting, motion, k if delay else k - 1)
         self.account.call(Cause.LINK_WRITE, self.board.send, self._sample(k, motion, acting, applied), t_ns)  # (3) (4)
         self._commit(k - 1)  # tick k - 1 is whole only now, with its answer; the board works meanwhile
         if not delay:
             self.board.drain(k)
-            applied = self._limited(self.commands.decide(k), motion)
+            applied = self._limited(self.commands.decide(k), motion, k)
         self.plant.advance(applied, t_ns, self.timing.period_ns)  # (5)
         self._record(k, motion, applied)  # (6)
         return motion
@@ -162,9 +162,10 @@ class Loop:
             self.clock.rebase(t_ns)
             self.account.rebased()
 
-    def _limited(self, acting: Acting, motion: Motion) -> Vector:
+    def _limited(self, acting: Acting, motion: Motion, tick: int) -> Vector:
+        """What comes of the command in `tick`; with delay 0 SAMPLE(k) says what acted until t_k, in the tick before."""
         command_Nm = np.array(acting.torque_Nm)
-        return self.actuator.limit(command_Nm, motion.momentum_B, self.period_s)
+        return self.actuator.limit(command_Nm, motion.momentum_B, self.period_s, tick)
 
     def _sample(self, k: int, motion: Motion, acting: Acting, applied: Vector) -> Sample:
         """What the board is told: readings, set-point, and what is really applied now."""
@@ -172,7 +173,7 @@ class Loop:
         valid = 0
         for sensor in self.sensors:
             readings[sensor.bit] = sensor.read(motion, k)
-            valid |= 1 << sensor.bit
+            valid |= sensor.valid << sensor.bit
         torque = to_lsb(applied, self.scales.torque_Nm)
         momentum = to_lsb(motion.momentum_B, self.scales.momentum_Nms)
         euler, quaternion, rate = readings

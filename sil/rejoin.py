@@ -1,9 +1,9 @@
 """A board that restarts in mid-run: how many of these a run survives, and the session that follows the lost one.
 
-Rules: protocol/SPEC.md, L14 to L16, L18. A restart is unasked, or planned by the scenario: then the laboratory itself begins
-the next session, since a new nonce resets a board from any state, and it is no mishap that anybody counts. Nothing here
-knows whether simulated time stands still meanwhile (lockstep) or goes on (a paced clock): whoever waits for frames
-hands them in and polls.
+Rules: protocol/SPEC.md, L14 to L16 and L18. A restart is unasked, or planned by the scenario: then the laboratory
+itself begins the next session, since a new nonce resets a board from any state, and it is no mishap that anybody
+counts. Nothing here knows whether simulated time stands still meanwhile (lockstep) or goes on (a paced clock): whoever
+waits for frames hands them in and polls.
 """
 
 from __future__ import annotations
@@ -39,8 +39,7 @@ class Rejoin:
         notify: Callable[[str], None],
         planned: Sequence[Restart] = (),
     ) -> None:
-        self._off_at = {restart.off_tick for restart in planned}
-        self._off = {tick for off, on in planned for tick in range(off, on)}
+        self._planned = tuple(planned)
         self._is_planned = False  # what is under way
         self._port, self._session, self._limit = port, session, limit
         self._recorder, self._notify = recorder, notify
@@ -57,11 +56,11 @@ class Rejoin:
 
     def off(self, tick: int) -> bool:
         """The scenario has the board switched off at this tick."""
-        return tick in self._off
+        return any(restart.off_tick <= tick < restart.on_tick for restart in self._planned)
 
     def switches_off(self, tick: int) -> bool:
         """... and this is the first tick of it."""
-        return tick in self._off_at
+        return any(restart.off_tick == tick for restart in self._planned)
 
     def switch_off(self, tick: int) -> None:
         """Before SAMPLE(tick), as the scenario says: the board begins anew now, and is left alone until it is on."""

@@ -1,7 +1,8 @@
 """A scenario: one YAML file that says everything about a test, validated into a frozen model with units and defaults.
 
 `load_scenario("mrac-rs232", ["duration_s=60"])` reads a built-in or a file, applies `extends` and the overrides, and
-raises ScenarioInvalid with one line per problem. The sections and their defaults are in scenario_sections.py.
+raises ScenarioInvalid with one line per problem. The sections and their defaults are in scenario_sections.py, those of
+sensors and wheels in scenario_instruments.py, the timeline in scenario_events.py.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from sil.profiles import PROFILES, SetpointRow, setpoints
 from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of, one_of, shown
 from sil.scenario_events import Event
 from sil.scenario_events import findings as event_findings
+from sil.scenario_faults import findings as fault_findings
+from sil.scenario_instruments import Actuators, Sensors
 from sil.scenario_metrics import refused_metric
 from sil.scenario_sections import (
-    Actuators,
     Attitude,
     Board,
     Clock,
@@ -34,7 +36,6 @@ from sil.scenario_sections import (
     Plant,
     Requirement,
     Section,
-    Sensors,
     Timing,
     Wire,
 )
@@ -355,7 +356,11 @@ def _files(scenario: Scenario) -> Iterator[Problem]:
 def _events(scenario: Scenario) -> Iterator[Problem]:
     if not scenario.ticks:
         return
-    for path, expected, got in event_findings(scenario.events, scenario.board, scenario.period_us, scenario.ticks):
+    period_us, ticks = scenario.period_us, scenario.ticks
+    for path, expected, got in (
+        *event_findings(scenario.events, scenario.board, period_us, ticks),
+        *fault_findings(scenario.sensors, scenario.actuators, period_us, ticks),
+    ):
         yield _problem(scenario, path, expected, got)
 
 

@@ -234,58 +234,6 @@ class Plant(Section):
     orbit: Orbit = Orbit()
 
 
-class Wheels(Section):
-    """Three reaction wheels along the body axes; one number means the same for all three."""
-
-    torque_max_Nm: LimitTriple = (0.1, 0.1, 0.1)
-    momentum_max_Nms: LimitTriple = (0.3, 0.3, 0.3)
-    inertia_kgm2: OneOrThreeNotNegative = (0.0, 0.0, 0.0)
-    """Spin inertia; 0: the momentum is just the integral of the negative torque."""
-    initial_speed_radps: OneOrThree = (0.0, 0.0, 0.0)
-    """Relative to the body; without spin inertia it carries no momentum."""
-
-
-class Actuators(Section):
-    """What turns commands into torque."""
-
-    wheels: Wheels = Wheels()
-
-
-class AttitudeSensor(Section):
-    """Euler angles of the body relative to attitude.frame."""
-
-    enabled: bool = True
-    noise_deg: NotNegative = 0.0
-    bits: Annotated[int, Field(ge=0, le=32)] = 0
-    """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
-
-
-class QuaternionSensor(Section):
-    """Star tracker: q_BN."""
-
-    enabled: bool = False
-    noise_deg: NotNegative = 0.0
-    bits: Annotated[int, Field(ge=0, le=31)] = 0
-    """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
-
-
-class RateSensor(Section):
-    """Gyros: omega_BN in body axes."""
-
-    enabled: bool = False
-    noise_degps: NotNegative = 0.0
-    lsb_degps: NotNegative = 0.0
-    """0: the wire's own, 2^-wire.rate_bits rad/s."""
-
-
-class Sensors(Section):
-    """What the board gets to see."""
-
-    attitude: AttitudeSensor = AttitudeSensor()
-    quaternion: QuaternionSensor = QuaternionSensor()
-    rate: RateSensor = RateSensor()
-
-
 class Attitude(Section):
     """How attitude is expressed, in readings, set-points and metrics alike."""
 

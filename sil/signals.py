@@ -43,14 +43,17 @@ class Plant(Protocol):
 class Actuator(Protocol):
     """What stands between a commanded torque and the body."""
 
-    def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float) -> Vector:
-        """Torque (3,) N m that really acts on the body for the coming period, given the wheel momentum (3,) N m s."""
+    def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float, tick: int) -> Vector:
+        """Torque (3,) N m that really acts on the body for the period that `tick` begins, given the wheel momentum
+        (3,) N m s. Called again for the same tick, with the command that acts after all, it answers anew.
+        """
 
 
 class Sensor(Protocol):
     """One instrument: truth in, integers in wire units out. The same (motion, tick) gives the same reading."""
 
     bit: int  # which reading of a SAMPLE it fills: 0 Euler angles, 1 quaternion, 2 rates
+    valid: bool  # whether it vouches for the reading it gave last
 
     def read(self, motion: Motion, tick: int) -> Reading:
         """The reading that leaves at `tick`."""

@@ -37,8 +37,11 @@ class Wheels:
             tuple(math.inf if limit is None else limit for limit in wheels.momentum_max_Nms),
         )
 
-    def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float) -> Vector:
-        """Torque (3,) N m on the body for the coming `period_s`, given the wheel momentum (3,) N m s now."""
+    def limit(self, command_Nm: Vector, momentum_B: Vector, period_s: float, tick: int = 0) -> Vector:
+        """Torque (3,) N m on the body for the coming `period_s`, given the wheel momentum (3,) N m s now.
+
+        The same in every tick.
+        """
         applied = np.empty(3)
         _limit(command_Nm, momentum_B, self._torque_max, self._momentum_max, period_s, applied)
         return applied

@@ -25,6 +25,7 @@ class Attitude:
     """The sensor `attitude`."""
 
     bit = 0
+    valid = True
 
     def __init__(self, noise_deg: float, bits: int, seed: int) -> None:
         self._steps_per_rad = 2 ** (bits or WIRE_BITS) / (2 * math.pi)

@@ -25,6 +25,7 @@ class Quaternion:
     """The sensor `quaternion`."""
 
     bit = 1
+    valid = True
 
     def __init__(self, noise_deg: float, bits: int, seed: int) -> None:
         self._steps = 2.0 ** ((bits or WIRE_BITS) - 1)

@@ -25,6 +25,7 @@ class Rate:
     """The sensor `rate`."""
 
     bit = 2
+    valid = True
 
     def __init__(self, noise_degps: float, lsb_degps: float, rate_bits: int, seed: int) -> None:
         self._lsb = math.radians(lsb_degps)

@@ -14,6 +14,7 @@ NOTES = frozenset(
         events.LINK_UP,
         events.BOARD_ON,
         events.SETPOINT,
+        events.FAULT_ENDS,
     )
 )
 OF_THE_HOST = frozenset((events.EPOCH_REBASED,))  # caused by this machine's clock alone: they go to timing.mcap

@@ -1,0 +1,144 @@
+"""The instruments of a scenario: sensors and wheels, and the faults that are given to them on purpose.
+
+    sensors: {attitude: {faults: [{kind: stuck, at_s: 100, for_s: 20, axis: x}]}}
+    actuators: {wheels: {faults: [{kind: wrong, scale: 0.7, axis: [x, z]}]}}
+
+A fault is there at every tick with at_s <= t_k < at_s + for_s. Several of one instrument act in the order of the list.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from sil.scenario_sections import (
+    Expected,
+    LimitTriple,
+    NotNegative,
+    OneOrThree,
+    OneOrThreeNotNegative,
+    Positive,
+    Section,
+)
+
+AXES = ("x", "y", "z")
+BIASES = ("bias_deg", "bias_degps", "bias_Nm")  # each instrument's faults have one of them
+
+
+def _axes(value: object) -> object:
+    items = value if isinstance(value, tuple) else (value,)
+    if value is None:
+        return None
+    if not items or any(item not in AXES for item in items) or len(set(items)) != len(items):
+        raise Expected("x, y or z, or a list of these")
+    return tuple(sorted(items))
+
+
+_AXIS: dict[str, Any] = {"enum": list(AXES)}
+_AXIS_SCHEMA = WithJsonSchema({"anyOf": [_AXIS, {"type": "array", "items": _AXIS, "minItems": 1}, {"type": "null"}]})
+Axes = Annotated[tuple[str, ...] | None, BeforeValidator(_axes), _AXIS_SCHEMA]
+Kind = Literal["off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent"]
+
+
+class Fault(Section):
+    """What goes wrong with an instrument, and when."""
+
+    kind: Kind
+    """off: gives nothing; stuck: stays at its value at the start; garbage: random values; wrong: scale and bias; slow:
+    renews its value once per period_s; delayed: its value of delay_s ago; intermittent: off now and then."""
+    at_s: NotNegative = 0.0
+    """Simulation time; it begins at the first tick not before."""
+    for_s: Positive | None = None
+    """How long; null: to the end."""
+    axis: Axes = None
+    """x, y, z or a list of them; null: all."""
+    scale: float | None = None
+    """For wrong: a factor, default 1."""
+    period_s: Positive | None = None
+    """For slow."""
+    delay_s: Annotated[float, Field(gt=0, le=4000)] | None = None
+    """For delayed; rounded up to whole periods of the run."""
+    fraction: Annotated[float, Field(ge=0, le=1)] | None = None
+    """For intermittent: share of the ticks, drawn at random, at which it is off."""
+    on_s: Positive | None = None
+    """For intermittent, with off_s and in place of fraction: it works for so long ..."""
+    off_s: Positive | None = None
+    """... and then does not for so long, over and over."""
+
+
+class AttitudeFault(Fault):
+    """A fault of the attitude sensor or the star tracker."""
+
+    bias_deg: float | None = None
+    """For wrong: what is added; star tracker: a turn about the body axes."""
+
+
+class RateFault(Fault):
+    """A fault of the gyros."""
+
+    bias_degps: float | None = None
+    """For wrong: what is added."""
+
+
+class WheelFault(Fault):
+    """A fault of the wheels: it acts on the torque that is commanded, and the wheels' limits on what comes of it."""
+
+    bias_Nm: float | None = None
+    """For wrong: what is added."""
+
+
+class Wheels(Section):
+    """Three reaction wheels along the body axes; one number means the same for all three."""
+
+    torque_max_Nm: LimitTriple = (0.1, 0.1, 0.1)
+    momentum_max_Nms: LimitTriple = (0.3, 0.3, 0.3)
+    inertia_kgm2: OneOrThreeNotNegative = (0.0, 0.0, 0.0)
+    """Spin inertia; 0: the momentum is just the integral of the negative torque."""
+    initial_speed_radps: OneOrThree = (0.0, 0.0, 0.0)
+    """Relative to the body; without spin inertia it carries no momentum."""
+    faults: tuple[WheelFault, ...] = ()
+
+
+class Actuators(Section):
+    """What turns commands into torque."""
+
+    wheels: Wheels = Wheels()
+
+
+class AttitudeSensor(Section):
+    """Euler angles of the body relative to attitude.frame."""
+
+    enabled: bool = True
+    noise_deg: NotNegative = 0.0
+    bits: Annotated[int, Field(ge=0, le=32)] = 0
+    """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
+    faults: tuple[AttitudeFault, ...] = ()
+
+
+class QuaternionSensor(Section):
+    """Star tracker: q_BN."""
+
+    enabled: bool = False
+    noise_deg: NotNegative = 0.0
+    bits: Annotated[int, Field(ge=0, le=31)] = 0
+    """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
+    faults: tuple[AttitudeFault, ...] = ()
+
+
+class RateSensor(Section):
+    """Gyros: omega_BN in body axes."""
+
+    enabled: bool = False
+    noise_degps: NotNegative = 0.0
+    lsb_degps: NotNegative = 0.0
+    """0: the wire's own, 2^-wire.rate_bits rad/s."""
+    faults: tuple[RateFault, ...] = ()
+
+
+class Sensors(Section):
+    """What the board gets to see."""
+
+    attitude: AttitudeSensor = AttitudeSensor()
+    quaternion: QuaternionSensor = QuaternionSensor()
+    rate: RateSensor = RateSensor()
