@@ -98,6 +98,7 @@ class Wheels(Section):
     initial_speed_radps: OneOrThree = (0.0, 0.0, 0.0)
     """Relative to the body; without spin inertia it carries no momentum."""
     faults: tuple[WheelFault, ...] = ()
+    """What goes wrong with them on purpose."""
 
 
 class Actuators(Section):
@@ -114,6 +115,7 @@ class AttitudeSensor(Section):
     bits: Annotated[int, Field(ge=0, le=32)] = 0
     """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
     faults: tuple[AttitudeFault, ...] = ()
+    """What goes wrong with it on purpose."""
 
 
 class QuaternionSensor(Section):
@@ -124,6 +126,7 @@ class QuaternionSensor(Section):
     bits: Annotated[int, Field(ge=0, le=31)] = 0
     """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
     faults: tuple[AttitudeFault, ...] = ()
+    """What goes wrong with it on purpose."""
 
 
 class RateSensor(Section):
@@ -134,6 +137,7 @@ class RateSensor(Section):
     lsb_degps: NotNegative = 0.0
     """0: the wire's own, 2^-wire.rate_bits rad/s."""
     faults: tuple[RateFault, ...] = ()
+    """What goes wrong with it on purpose."""
 
 
 class Sensors(Section):

@@ -95,7 +95,9 @@ def test_what_is_beyond_a_schema_is_that_and_no_more() -> None:
      "plant: {inertia_kgm2: [2, 3, 3]}", "law: {name: mrac, params: {identify: on, trace_max: null}}",
      "law: {name: './mine.py:Mine', params: {anything: 1}}", "extends: mrac-rs232\nlaw: {params: {kappa: 0.2}}",
      "require: [{metric: missed, below: 1, above: null}]", "law: {params: {controller_pole: 0.7}}",
-     "law: {form: float}"],
+     "law: {form: float}", "events: [{at_s: 1, do: setpoint, deg: [5, 0, 0]}, {at_s: 2, do: link.disconnect}]",
+     "sensors: {attitude: {faults: [{kind: off, axis: x}, {kind: wrong, bias_deg: 1, axis: [x, y], for_s: null}]}}",
+     "actuators: {wheels: {faults: [{kind: intermittent, fraction: 0.1}, {kind: wrong, bias_Nm: 0.01}]}}"],
 )  # fmt: skip
 def test_short_forms_are_valid(short: str, tmp_path: Path) -> None:
     assert refused(short) == []
@@ -118,7 +120,10 @@ def test_every_short_form_of_the_loader_is_in_the_schema() -> None:
      "require: [{metric: missed}]", "law: {name: mrac, params: {kappa: two}}", "law: {name: mrac, version: 99}",
      "timing: {max_degraded_fraction: 2}", "clock: scaled:5000", "clock: {mode: scaled:0}",
      "law: {params: {nope: 1}}", "law: {params: {controller_pole: two}}",
-     "guidance: {profile: steps, rows: [{t_s: 1, attitude_deg: [1, 2]}]}", "extends: 3"],
+     "guidance: {profile: steps, rows: [{t_s: 1, attitude_deg: [1, 2]}]}", "extends: 3",
+     "events: [{at_s: 1, do: board.reboot}]", "events: [{do: setpoint}]", "events: [{at_s: 1, do: setpoint, deg: [1]}]",
+     "sensors: {rate: {faults: [{kind: wrong, bias_deg: 1}]}}", "sensors: {rate: {faults: [{kind: off, axis: w}]}}",
+     "actuators: {wheels: {faults: [{at_s: 1}]}}", "actuators: {wheels: {faults: [{kind: off, for_s: 0}]}}"],
 )  # fmt: skip
 def test_wrong_short_and_long_forms_are_refused(wrong: str) -> None:
     assert refused(wrong)
