@@ -14,28 +14,29 @@ from typing import Annotated, Any, Literal, NamedTuple
 from pydantic import BeforeValidator
 
 from sil.scenario_errors import Path
-from sil.scenario_sections import Expected, NotNegative, Numbers3, Positive, Section, numbers_of
+from sil.scenario_sections import Expected, Lapse, Moment, Numbers3, Section, numbers_of
 
+MOST_DEG = 360e6
 DISCONNECT, RESTART, SETPOINT = "link.disconnect", "board.restart", "setpoint"
 
 
 def _angles(value: object) -> object:
     if value is None:
         return None
-    if (numbers := numbers_of(value, 3)) is None:
-        raise Expected("3 numbers in deg")
+    if (numbers := numbers_of(value, 3)) is None or max(map(abs, numbers)) > MOST_DEG:
+        raise Expected(f"3 numbers in deg, within +-{MOST_DEG:g}")
     return numbers
 
 
 class Event(Section):
     """Something that happens on purpose while the run goes on."""
 
-    at_s: NotNegative
+    at_s: Moment
     """Simulation time; it begins at the first tick not before."""
     do: Literal["link.disconnect", "board.restart", "setpoint"]
     """link.disconnect: nothing passes, either way; board.restart: the board is off, and comes back with nothing in its
     memory; setpoint: another commanded attitude."""
-    for_s: Positive | None = None
+    for_s: Lapse | None = None
     """How long the link is down (null: to the end) or the board is off."""
     deg: Annotated[Numbers3 | None, BeforeValidator(_angles)] = None
     """For setpoint: the commanded attitude, until the guidance profile or another event changes it."""

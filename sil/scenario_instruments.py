@@ -14,11 +14,12 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from sil.scenario_sections import (
     Expected,
+    Lapse,
     LimitTriple,
+    Moment,
     NotNegative,
     OneOrThree,
     OneOrThreeNotNegative,
-    Positive,
     Section,
 )
 
@@ -38,6 +39,8 @@ def _axes(value: object) -> object:
 _AXIS: dict[str, Any] = {"enum": list(AXES)}
 _AXIS_SCHEMA = WithJsonSchema({"anyOf": [_AXIS, {"type": "array", "items": _AXIS, "minItems": 1}, {"type": "null"}]})
 Axes = Annotated[tuple[str, ...] | None, BeforeValidator(_axes), _AXIS_SCHEMA]
+Bias = Annotated[float, Field(ge=-1e6, le=1e6)]
+Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
 Kind = Literal["off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent"]
 
 
@@ -47,44 +50,44 @@ class Fault(Section):
     kind: Kind
     """off: gives nothing; stuck: stays at its value at the start; garbage: random values; wrong: scale and bias; slow:
     renews its value once per period_s; delayed: its value of delay_s ago; intermittent: off now and then."""
-    at_s: NotNegative = 0.0
+    at_s: Moment = 0.0
     """Simulation time; it begins at the first tick not before."""
-    for_s: Positive | None = None
+    for_s: Lapse | None = None
     """How long; null: to the end."""
     axis: Axes = None
     """x, y, z or a list of them; null: all."""
-    scale: float | None = None
+    scale: Factor | None = None
     """For wrong: a factor, default 1."""
-    period_s: Positive | None = None
+    period_s: Lapse | None = None
     """For slow."""
     delay_s: Annotated[float, Field(gt=0, le=4000)] | None = None
     """For delayed; rounded up to whole periods of the run."""
     fraction: Annotated[float, Field(ge=0, le=1)] | None = None
     """For intermittent: share of the ticks, drawn at random, at which it is off."""
-    on_s: Positive | None = None
+    on_s: Lapse | None = None
     """For intermittent, with off_s and in place of fraction: it works for so long ..."""
-    off_s: Positive | None = None
+    off_s: Lapse | None = None
     """... and then does not for so long, over and over."""
 
 
 class AttitudeFault(Fault):
     """A fault of the attitude sensor or the star tracker."""
 
-    bias_deg: float | None = None
+    bias_deg: Bias | None = None
     """For wrong: what is added; star tracker: a turn about the body axes."""
 
 
 class RateFault(Fault):
     """A fault of the gyros."""
 
-    bias_degps: float | None = None
+    bias_degps: Bias | None = None
     """For wrong: what is added."""
 
 
 class WheelFault(Fault):
     """A fault of the wheels: it acts on the torque that is commanded, and the wheels' limits on what comes of it."""
 
-    bias_Nm: float | None = None
+    bias_Nm: Bias | None = None
     """For wrong: what is added."""
 
 

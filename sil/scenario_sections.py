@@ -176,6 +176,8 @@ Url = Annotated[str, BeforeValidator(_url)]
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=0)]
+Moment = Annotated[float, Field(ge=0, le=1e12)]  # s; beyond the last tick there can be
+Lapse = Annotated[float, Field(ge=1e-6, le=1e12)]  # s
 
 
 class Sine(Section):

@@ -21,6 +21,10 @@ BROKEN = {
     "no verb": ("  - {at_s: 1}\n", "events[0].do", 3, "a value", "nothing"),
     "no time": ("  - {do: setpoint, deg: [1, 0, 0]}\n", "events[0].at_s", 3, "a value", "nothing"),
     "unknown key": ("  - {at_s: 1, do: setpoint, degs: 1, deg: [1, 0, 0]}\n", "events[0].degs", 3, "deg", "unknown"),
+    "too late": ("  - {at_s: 1.0e+305, do: link.disconnect}\n", "events[0].at_s", 3, "not above 1e+12", "1e+305"),
+    "angles to turn on": (
+        "  - {at_s: 1, do: setpoint, deg: [0, 0, 1.0e+20]}\n", "events[0].deg", 3, "within +-3.6e+08", "1e+20",
+    ),
     "before the start": ("  - {at_s: -1, do: link.disconnect}\n", "events[0].at_s", 3, "not below 0", "-1"),
     "at the end": ("  - {at_s: 100, do: link.disconnect}\n", "events[0].at_s", 3, "at most 99.5 s", "100"),
     "after the last tick": ("  - {at_s: 99.7, do: link.disconnect}\n", "events[0].at_s", 3, "at most 99.5 s", "99.7"),
@@ -31,7 +35,7 @@ BROKEN = {
     "disconnect beyond the end": (
         "  - {at_s: 90, do: link.disconnect, for_s: 11}\n", "events[0].for_s", 3, "at most 10 s", "11",
     ),
-    "no time at all": ("  - {at_s: 9, do: link.disconnect, for_s: 0}\n", "events[0].for_s", 3, "above 0", "0"),
+    "no time at all": ("  - {at_s: 9, do: link.disconnect, for_s: 0}\n", "events[0].for_s", 3, "not below 1e-06", "0"),
     "restart without end": ("  - {at_s: 9, do: board.restart}\n", "events[0].for_s", 3, "how long the board", "null"),
     "restart between ticks": (
         "  - {at_s: 9.1, do: board.restart, for_s: 0.1}\n", "events[0].for_s", 3, "covers a tick, one every 0.5", "0.1",
