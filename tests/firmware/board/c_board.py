@@ -49,10 +49,11 @@ class Heard(NamedTuple):
 
 
 class CBoard:
-    """firmware/core with script.c, as a library. `options`: more for the compiler."""
+    """firmware/core with script.c, as a library. `options`: more for the compiler; `law`: a file instead of laws.c."""
 
-    def __init__(self, folder: Path, *options: str) -> None:
-        path = built(folder, "scripted.so", [*library.FLAGS, *library.SHARED, *options], ["script.c"])
+    def __init__(self, folder: Path, *options: str, law: str = "") -> None:
+        files = ["script.c", *([law] if law else [])]
+        path = built(folder, "scripted.so", [*library.FLAGS, *library.SHARED, *options], files)
         self._lib = ctypes.CDLL(str(path))
         for name in ("script_serve", "script_decode", "script_datagrams", "cobs_decode"):
             getattr(self._lib, name).restype = ctypes.c_size_t
@@ -106,8 +107,10 @@ def built(folder: Path, name: str, flags: Sequence[str], files: Sequence[str]) -
     if not path.exists():
         compiler = next(library.compilers())
         folder.mkdir(parents=True, exist_ok=True)
-        sources = [*library.c_files(library.FOLDERS[:2]), *map(str, mine)]
-        library.build(path, compiler, [*flags, *WARNINGS, *sources])
+        core = library.c_files(library.FOLDERS[:2])
+        if any(file.endswith("law.c") for file in files):
+            core.remove(str(CORE / "laws.c"))
+        library.build(path, compiler, [*flags, *WARNINGS, *core, *map(str, mine)])
     return path
 
 

@@ -71,7 +71,10 @@ def _make_values_right(random: Random, body: bytearray) -> None:
         body[10:12] = b"\0\0"
     elif type_ == Type.HELLO and len(body) == 52:
         body[10] = random.randrange(2)
-        body[28:52] = bytes(random.randrange(0x20, 0x7F) for _ in range(random.randrange(25))).ljust(24, b"\0")
+        build = [random.randrange(0x20, 0x7F) for _ in range(random.randrange(25))]
+        if build and random.random() < 0.2:
+            build[random.randrange(len(build))] = random.choice((0, 0x1F, 0x7F, 0x80))
+        body[28:52] = bytes(build).ljust(24, b"\0")
 
 
 def any_bytes(random: Random, packet: bytes) -> bytes:

@@ -139,6 +139,12 @@ def test_what_a_c_board_refuses(c_board: CBoard, index: int, value: int, status:
     assert frames.unpack(answer).frame == Ready(status, told, 0)
 
 
+def test_rows_less_than_none_do_not_make_up_for_missing_words(c_board: CBoard) -> None:
+    words = list(config_words(TABLES[0], {}))[:-ROW_WORDS]
+    words[[word.name for word in COMMON].index("guidance_rows")] = -1
+    assert ready_of(c_board, words) == Ready(frames.READY_MISSING_PARTS, frames.NO_INDEX, 0)
+
+
 def test_the_longest_configuration(c_board: CBoard) -> None:
     """4096 rows: all words that there can be, last part first."""
     rows = [(tick, tick, -tick, 0) for tick in range(4096)]
