@@ -6,6 +6,7 @@ The processes are `python -m sil.pil.budget`: the emulator is theirs alone.
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -88,7 +89,7 @@ class _Child:
         options = ["--image", str(image)] if image is not None else []
         with order.open("rb") as stdin, self._out.open("wb") as stdout, self._err.open("wb") as stderr:
             self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "sil.pil.budget", *options],
+                [sys.executable, "-P", "-m", "sil.pil.budget", "--parent", str(os.getpid()), *options],
                 stdin=stdin,
                 stdout=stdout,
                 stderr=stderr,

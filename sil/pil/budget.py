@@ -1,4 +1,4 @@
-"""What one flight costs the firmware: python -m sil.pil.budget [--image FILE] < flight.json > figures.json.
+"""What one flight costs the firmware: python -m sil.pil.budget [--image FILE] [--parent PID] < flight > figures.
 
 In: `law` (name), `config` (packets), `ticks` (pairs of what goes in at a tick, and the answer that has to come out);
 packets in hexadecimal. Out: instructions of every call of the law's step and of the whole step of the board, and of
@@ -20,7 +20,7 @@ from protocol.codec import StreamDecoder, encode
 from protocol.frames import Hello, Type
 from sil.pil.counting import Counter
 from sil.pil.engine import EngineError
-from sil.pil.hosting import EXIT_BOARD, EXIT_USAGE, fail
+from sil.pil.hosting import EXIT_BOARD, EXIT_USAGE, die_with, fail
 from sil.pil.image import Image, ImageError, load_image
 from sil.pil.machine import Machine, ResetStorm
 
@@ -39,7 +39,10 @@ def main(argv: list[str] | None = None, into: TextIO = sys.stdin, out: TextIO = 
     """Exit codes: 0 counted, 2 no unicorn, no image or no flight, 4 the image answers otherwise, or not at all."""
     parser = argparse.ArgumentParser(prog="sil.pil.budget", description="Instructions of one flight, counted.")
     parser.add_argument("--image", type=Path, metavar="FILE", help="an image of your own; default: the one that ships")
+    parser.add_argument("--parent", type=int, metavar="PID", help="exit at once when this process is gone")
     options = parser.parse_args(argv)
+    if options.parent:
+        die_with(options.parent)
     try:
         order = json.load(into)
         figures = count(load_image(options.image), order)

@@ -6,6 +6,10 @@ When a change is worth its price: `sil pil-report --json > tests/firmware/budget
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -79,6 +83,27 @@ def test_an_image_that_answers_otherwise_is_not_measured(short: Flight) -> None:
     spoilt = replace(short, ticks=(*short.ticks[:7], (sent, (answer[0][:-1] + b"\x00", *answer[1:])), *short.ticks[8:]))
     with pytest.raises(LinkFailure, match="the image answers otherwise than the recorded board at tick 7"):
         measure([spoilt])
+
+
+def test_a_meter_ends_with_its_parent() -> None:
+    """Whatever killed that: it has no link whose end would tell it. Its input stays open here."""
+    script = (
+        "import os, subprocess, sys\n"
+        "command = [sys.executable, '-m', 'sil.pil.budget', '--parent', str(os.getpid())]\n"
+        "child = subprocess.Popen(command, stdin=int(sys.argv[1]), stdout=subprocess.DEVNULL)\n"
+        "print(child.pid, flush=True)\n"
+        "os.kill(os.getpid(), 9)\n"
+    )
+    reader, writer = os.pipe()
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(reader)], stdout=subprocess.PIPE, text=True, pass_fds=[reader], timeout=60
+    )
+    place, give_up = Path(f"/proc/{int(done.stdout)}/stat"), time.monotonic() + 20.0
+    while place.exists() and place.read_text().rpartition(")")[2].split()[0] != "Z":
+        assert time.monotonic() < give_up, "it lives on"
+        time.sleep(0.02)
+    os.close(reader)
+    os.close(writer)
 
 
 def test_a_recorded_run_is_a_flight_too(tmp_path: Path, short: Flight) -> None:
