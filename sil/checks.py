@@ -19,11 +19,13 @@ from sil.boards import FIRMWARE, WITHOUT_TIMER
 from sil.configure import Orders, orders
 from sil.scenario import Scenario, load_scenario
 from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
+from sil.scenario_events import RESTART
 from sil.schedule import read_schedule
 from sil.sensors import SENSORS
 
 Severity = Literal["error", "warning"]
 ENDS_FOR_GOOD = ("process", "inproc", "native")  # boards without a reset of their own
+READY_AGAIN_S = 0.25  # the Python board takes 0.1 s
 ANGLES = ("roll", "pitch", "yaw")
 
 
@@ -58,7 +60,7 @@ def check(scenario: Scenario) -> list[Finding]:
     if scenario.board == "none":
         checks.insert(0, _schedule)
     else:
-        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, _restarts, *checks, _manoeuvre]
+        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, _restarts, _planned_restarts, *checks, _manoeuvre]
     found = [finding for each in checks for finding in each(scenario)]
     return sorted(found, key=lambda finding: finding.severity != "error")
 
@@ -146,6 +148,16 @@ def _restarts(scenario: Scenario) -> Iterator[Finding]:
     if limit and board in ENDS_FOR_GOOD and not scenario.link.url.startswith("serial:"):
         expected = "0, or a board that can restart by itself (cortex-m, qemu, serial://PATH, udp://HOST:PORT)"
         yield _warning(scenario, "restart_limit", expected, f"{limit} with board {board}")
+
+
+def _planned_restarts(scenario: Scenario) -> Iterator[Finding]:
+    """On a clock the board has so much wall time to be ready again; a slower one costs real misses."""
+    scale = scenario.clock_scale
+    for index, event in enumerate(scenario.events):
+        if event.do == RESTART and event.for_s is not None and scale and event.for_s / scale < READY_AGAIN_S:
+            expected = f"at least {READY_AGAIN_S * scale:g} s, {READY_AGAIN_S:g} s on the wall for the board to be ready"
+            got, place = f"{event.for_s:g} at {scenario.clock.mode}", scenario.where(f"events.{index}.for_s")
+            yield _finding("warning", _at(place, f"events[{index}].for_s", expected, got))
 
 
 def _deadline(scenario: Scenario) -> Iterator[Finding]:

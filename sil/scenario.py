@@ -159,8 +159,8 @@ class Scenario(Section):
         return None if text is None else self._source.directory_of(tuple(key.split("."))) / text
 
     def where(self, key: str) -> Where:
-        """File and line (or --set) that decided `key`, or the nearest section above it."""
-        return self._source.where_of(tuple(key.split(".")))
+        """File and line (or --set) that decided `key`, such as events.0.at_s, or the nearest section above it."""
+        return self._source.where_of(tuple(int(part) if part.isdecimal() else part for part in key.split(".")))
 
     # -- out ----------------------------------------------------------------------------------------------------------
 

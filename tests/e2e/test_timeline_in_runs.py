@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 
 from protocol import events
@@ -11,6 +13,8 @@ from sil.replay import replay
 from sil.report.info import info, text
 from sil.runner import run_scenario
 from sil.scenario import load_values
+from sil.sinks.journal import Kind, read_journal
+from sil.sinks.seal import recover
 
 TIMELINE = (
     {"at_s": 10, "do": "link.disconnect", "for_s": 8},
@@ -69,6 +73,21 @@ def test_it_replays_identically_in_three_sessions(recorded):
     assert summary["reproducible"] is True
     assert (summary["link"]["restarts"], summary["restarted_at_ticks"]) == (0, [])
     assert (summary["link"]["real_misses"], summary["link"]["strays"]) == (0, 0)
+
+
+def test_a_journal_cut_off_anywhere_is_recovered_and_replays(tmp_path, recorded):
+    """Also within a restart, where ticks have no frames."""
+    commits = [r for r in read_journal(recorded[1].directory / "run.journal") if r.kind == Kind.COMMIT]
+    for record in (each for each in commits if each.tick in (49, 50, 51, 61, 62, 63, 80, 92, 93, 110)):
+        cut = tmp_path / str(record.tick)
+        cut.mkdir()
+        shutil.copy(recorded[1].directory / "run.journal", cut)
+        with open(cut / "run.journal", "r+b") as file:
+            file.truncate(record.offset + 13 + 7)  # its COMMIT, and a part of what follows
+        assert recover(cut).ticks == record.tick + 1
+        run = open_run(cut)
+        assert run.sessions == [start for start in (0, 62, 93) if start <= record.tick]
+        assert replay(run).identical
 
 
 def test_what_the_log_says(recorded):

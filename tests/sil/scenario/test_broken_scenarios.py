@@ -229,6 +229,9 @@ WARNINGS = {
     "wheels filled by a disturbance": ("plant: {disturbance_Nm: [1e-3, 0, 0]}", "plant.disturbance_Nm.constant_Nm"),
     "too weak wheels": ("actuators: {wheels: {torque_max_Nm: 0.07}}", "actuators.wheels.torque_max_Nm"),
     "too small wheels": ("actuators: {wheels: {momentum_max_Nms: 0.09}}", "actuators.wheels.momentum_max_Nms"),
+    "a board that has no time to be ready": (
+        "clock: scaled:20\nevents: [{at_s: 10, do: board.restart, for_s: 2}]", "events[0].for_s",
+    ),
     "a limit beyond the period": (
         "clock: scaled:20\ntiming: {max_lateness_ms: 100}", "timing.max_lateness_ms",
     ),
