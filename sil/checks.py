@@ -60,7 +60,18 @@ def check(scenario: Scenario) -> list[Finding]:
     if scenario.board == "none":
         checks.insert(0, _schedule)
     else:
-        checks = [firmware_flies, _law, _sensors, _clock, _deadline, _lateness_limit, _restarts, _planned_restarts, *checks, _manoeuvre]
+        checks = [
+            firmware_flies,
+            _law,
+            _sensors,
+            _clock,
+            _deadline,
+            _lateness_limit,
+            _restarts,
+            _planned_restarts,
+            *checks,
+            _manoeuvre,
+        ]
     found = [finding for each in checks for finding in each(scenario)]
     return sorted(found, key=lambda finding: finding.severity != "error")
 
@@ -155,7 +166,7 @@ def _planned_restarts(scenario: Scenario) -> Iterator[Finding]:
     scale = scenario.clock_scale
     for index, event in enumerate(scenario.events):
         if event.do == RESTART and event.for_s is not None and scale and event.for_s / scale < READY_AGAIN_S:
-            expected = f"at least {READY_AGAIN_S * scale:g} s, {READY_AGAIN_S:g} s on the wall for the board to be ready"
+            expected = f"at least {READY_AGAIN_S * scale:g} s, {READY_AGAIN_S:g} s on the wall for it to be ready"
             got, place = f"{event.for_s:g} at {scenario.clock.mode}", scenario.where(f"events.{index}.for_s")
             yield _finding("warning", _at(place, f"events[{index}].for_s", expected, got))
 
