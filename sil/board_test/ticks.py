@@ -22,6 +22,7 @@ MOST_EVENTS = 16
 TRANSIT_US = 6857
 ORDER = ("Command", "Telemetry", "Event")
 RANDOM_STEPS = 300
+LIMIT_NM = 0.02  # so that some torques are at it
 BUSY_US = 420_000  # a TICK, or a SAMPLE that took long, makes the next one an overrun
 SEED = 4
 
@@ -314,7 +315,7 @@ def at_random(at: Examinee) -> Finding:
     """Everything at once, in any order, byte for byte as the reference."""
     steps = RANDOM_STEPS if at.baud is None else RANDOM_STEPS // 3
     for table in at.laws:
-        twin = Twin(at, table, link_limit=4, answer_delay_us=BUSY_US, telemetry_every=2)
+        twin = Twin(at, table, link_limit=4, answer_delay_us=BUSY_US, telemetry_every=2, torque_limit=LIMIT_NM)
         rng, tick = random.Random(SEED), 0
         for number in range(steps):
             at.tell(f"{table.name}: step {number + 1} of {steps}")
