@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import select
 import socket
 import time
 from abc import abstractmethod
@@ -14,6 +15,8 @@ from protocol.link import Link, LinkClosed, LinkError, Waiter
 
 STOP = bytes((frames.Type.STOP,))
 PEER_SILENCE_S = 3.0  # after this, a HELLO from somebody else takes the board over
+STRANGERS_AT_ONCE = 16  # datagrams; between them the peer gets its turn
+FRUITLESS_READS = 16  # after the time is up: whoever floods the port does not prolong a wait for ever
 
 
 class UdpLink(Link):
@@ -21,11 +24,11 @@ class UdpLink(Link):
 
     datagram = True
 
-    def __init__(self, sock: socket.socket, name: str) -> None:
+    def __init__(self, sock: socket.socket, name: str, wait_for: int | None = None) -> None:
         sock.setblocking(False)
         self._socket = sock
         self._name = name
-        self._waiter = Waiter(sock.fileno())
+        self._waiter = Waiter(sock.fileno() if wait_for is None else wait_for)
         self.strangers = 0
         self.refused = 0  # "nobody listens there", as the network told us
 
@@ -44,6 +47,7 @@ class UdpLink(Link):
     def receive(self, timeout_s: float | None) -> bytes:
         """The next datagram that counts; waits on over refusals, strangers and empty ones until the time is up."""
         deadline = time.monotonic() + timeout_s if timeout_s else 0.0
+        fruitless = 0
         while True:
             try:
                 if not self._waiter.readable(timeout_s):
@@ -53,8 +57,11 @@ class UdpLink(Link):
                 raise self._failure(error) from None
             if data:
                 return data
-            if timeout_s:
+            fruitless += 1
+            if timeout_s is not None:
                 timeout_s = max(0.0, deadline - time.monotonic())
+                if timeout_s == 0.0 and fruitless >= FRUITLESS_READS:
+                    return b""
 
     @abstractmethod
     def _read(self) -> bytes:
@@ -126,13 +133,16 @@ class UdpBoard(UdpLink):
     """The board's end. Serves the peer whose HELLO it took last, until STOP, release() or PEER_SILENCE_S of silence.
 
     Without a peer it answers whoever sends a packet with a right CRC: so a lab learns that the board restarted.
+
+    The peer has a socket of its own, connected to it, so that however much strangers send, it is their socket that
+    overflows, and no frame of the session is lost for want of room.
     """
 
     def __init__(self, host: str, port: int) -> None:
         name = f"udp://{_bracket(host)}:{port}"
         try:
-            family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-            sock = socket.socket(family, kind, number)
+            self._family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            sock = socket.socket(self._family, kind, number)
             sock.bind(address)
         except OSError as error:
             why = "the port is busy" if error.errno == errno.EADDRINUSE else error.strerror
@@ -140,40 +150,73 @@ class UdpBoard(UdpLink):
         self.host, self.port = host, sock.getsockname()[1]
         self.url = f"udp://{_bracket(host)}:{self.port}"
         self._peer: Any = None  # the address that owns the session
+        self._to_peer: socket.socket | None = None  # None where that cannot be had
+        self._connected: Any = None  # the address it is connected to
         self._reply_to: Any = None  # the address the next send() goes to
         self._heard_s = 0.0
         self.unsent = 0  # nobody to send to
-        super().__init__(sock, self.url)
+        self._epoll = select.epoll()
+        self._epoll.register(sock, select.EPOLLIN)
+        super().__init__(sock, self.url, self._epoll.fileno())
 
     def release(self) -> None:
         """The session is over: the next HELLO, from wherever, is welcome. Answers still go to the last sender."""
         self._peer = None
+
+    def fileno(self) -> int:
+        return -1 if self._epoll.closed else self._epoll.fileno()
+
+    def close(self) -> None:
+        self._epoll.close()
+        if self._to_peer is not None:
+            self._to_peer.close()
+        super().close()
 
     def send(self, data: bytes) -> None:
         if self._reply_to is None:
             self.unsent += 1
             return
         try:
-            self._socket.sendto(data, self._reply_to)
+            if self._to_peer is not None and self._connected == self._reply_to:
+                self._to_peer.send(data)
+            else:
+                self._socket.sendto(data, self._reply_to)
         except ConnectionRefusedError:
             self.refused += 1
         except OSError as error:
             raise self._failure(error) from None
 
     def _read(self) -> bytes:
+        """The next datagram that counts. Nobody's socket is emptied before the other one is looked at."""
+        for _ in range(STRANGERS_AT_ONCE):
+            data, sender = self._take(self._socket)
+            if sender is None:
+                break
+            if self._counts(data, sender):
+                return data
+        if self._to_peer is None:
+            return b""
+        data, sender = self._take(self._to_peer)
+        return data if sender is not None and self._counts(data, sender) else b""
+
+    def _take(self, sock: socket.socket) -> tuple[bytes, Any]:
+        """(datagram, its sender); sender None: nothing there."""
         try:
-            data, sender = self._socket.recvfrom(2048)
+            return sock.recvfrom(2048)
         except ConnectionRefusedError:
             self.refused += 1
-            return b""
         except BlockingIOError:
-            return b""
-        if sender == self._peer:
-            self._heard_s = time.monotonic()
-            if data[1:2] == STOP and frames.has_right_crc(data):
-                self.release()
-            return data
-        return data if self._welcome(data, sender) else b""
+            pass
+        return b"", None
+
+    def _counts(self, data: bytes, sender: Any) -> bool:
+        """Whether this datagram may be read: the peer's, or one that is welcome."""
+        if sender != self._peer:
+            return self._welcome(data, sender)
+        self._heard_s = time.monotonic()
+        if data[1:2] == STOP and frames.has_right_crc(data):
+            self.release()
+        return True
 
     def _welcome(self, data: bytes, sender: Any) -> bool:
         """Whether a datagram from somebody who is not the peer may be read."""
@@ -186,7 +229,36 @@ class UdpBoard(UdpLink):
         self._reply_to = sender
         if hello:
             self._peer, self._heard_s = sender, time.monotonic()
+            self._connect(sender)
         return True
+
+    def _connect(self, peer: Any) -> None:
+        """A socket on the same port for this peer alone: the kernel hands it what the peer sends.
+
+        The port is shared for this moment only, so that a second board on it is still refused.
+        """
+        if self._to_peer is not None:
+            if self._connected == peer:
+                return
+            self._to_peer.close()
+            self._to_peer = None
+        made = socket.socket(self._family, socket.SOCK_DGRAM)
+        try:
+            self._share_port(True)
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            made.setblocking(False)
+            made.bind(self._socket.getsockname())
+            made.connect(peer)
+        except OSError:
+            made.close()  # one socket for all will do
+            return
+        finally:
+            self._share_port(False)
+        self._to_peer, self._connected = made, peer
+        self._epoll.register(made, select.EPOLLIN)
+
+    def _share_port(self, shared: bool) -> None:
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, int(shared))
 
 
 def _parse(url: str) -> tuple[str, int]:

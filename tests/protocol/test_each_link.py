@@ -281,6 +281,60 @@ def test_udp_garbage_does_not_prolong_the_wait() -> None:
             thread.join()
 
 
+def test_udp_a_flood_of_strangers_costs_the_session_no_frame() -> None:
+    """Faster than anybody could read it, and more than any buffer holds: what the peer sends is all there."""
+    with UdpBoard("127.0.0.1", 0) as board:
+        assert isinstance(board, UdpBoard)
+        with session(board) as lab, UdpLab("127.0.0.1", board.port) as stranger:
+            sent = 0
+            for tick in range(100):
+                for _ in range(200):
+                    stranger.send(HELLO if sent % 2 else b"garbage" * 100)
+                    sent += 1
+                lab.send(f.pack(f.Tick(tick), tick))
+            got = [f.unpack(board.receive(1.0)).tick for _ in range(100)]
+            assert got == list(range(100))
+            assert board.receive(0.0) == b""
+            assert 0 < board.strangers <= sent  # the kernel drops what has no room, uncounted
+
+
+def test_udp_a_flood_does_not_prolong_a_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even one of no time at all, with more to read each time one looks."""
+    with UdpBoard("127.0.0.1", 0) as board:
+        assert isinstance(board, UdpBoard)
+        with session(board), UdpLab("127.0.0.1", board.port) as stranger:
+            take = board._take
+
+            def one_more(sock: socket.socket) -> tuple[bytes, object]:
+                stranger.send(b"garbage")
+                return take(sock)
+
+            monkeypatch.setattr(board, "_take", one_more)
+            for timeout_s in (0.0, 0.05):
+                stranger.send(b"garbage")
+                start = time.monotonic()
+                assert board.receive(timeout_s) == b""
+                assert time.monotonic() - start < timeout_s + 0.5
+
+
+def test_udp_a_second_board_on_the_port_is_refused_during_a_session_too() -> None:
+    busy = pytest.raises(LinkError, match="the port is busy")
+    with UdpBoard("127.0.0.1", 0) as board, session(board), busy:  # type: ignore[arg-type]
+        open_link(board.url, listen=True)
+
+
+def test_udp_the_same_laboratory_comes_again_on_the_same_socket() -> None:
+    """STOP and HELLO in one go, as `sil doctor` and a test bench do."""
+    with UdpBoard("127.0.0.1", 0) as board:
+        assert isinstance(board, UdpBoard)
+        with session(board) as lab:
+            for data in (STOP, HELLO, TICK):
+                lab.send(data)
+            assert [board.receive(1.0) for _ in range(3)] == [STOP, HELLO, TICK]
+            board.send(TICK)
+            assert lab.receive(1.0) == TICK
+
+
 # -- inproc -----------------------------------------------------------------------------------------------------------
 
 
