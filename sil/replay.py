@@ -105,8 +105,11 @@ def recorded_scenario(run: Run, sets: Iterable[str] = (), board: str = "process"
 def _changed_law(run: Run, scenario: Scenario) -> str:
     then = str(run.meta.get("law_file_sha256") or "")
     file = user_law_spec(scenario).rpartition(":")[0]
-    if not then or hashlib.sha256(Path(file).read_bytes()).hexdigest() == then:
-        return ""
+    try:
+        if not then or hashlib.sha256(Path(file).read_bytes()).hexdigest() == then:
+            return ""
+    except OSError as error:
+        return f"{file or 'law'}: not the law that flew: its file cannot be read: {error.strerror}"
     return f"{file}: not the law that flew: its file has changed since the run"
 
 

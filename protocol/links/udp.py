@@ -141,8 +141,8 @@ class UdpBoard(UdpLink):
     def __init__(self, host: str, port: int) -> None:
         name = f"udp://{_bracket(host)}:{port}"
         try:
-            self._family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-            sock = socket.socket(self._family, kind, number)
+            family, kind, number, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+            sock = socket.socket(family, kind, number)
             sock.bind(address)
         except OSError as error:
             why = "the port is busy" if error.errno == errno.EADDRINUSE else error.strerror
@@ -242,7 +242,7 @@ class UdpBoard(UdpLink):
                 return
             self._to_peer.close()
             self._to_peer = None
-        made = socket.socket(self._family, socket.SOCK_DGRAM)
+        made = socket.socket(self._socket.family, socket.SOCK_DGRAM)
         try:
             self._share_port(True)
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

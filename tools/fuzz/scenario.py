@@ -143,6 +143,8 @@ def _plain(file: bytes) -> Any:
     try:
         return json.loads(file)
     except ValueError:
+        if b"&" in file:
+            raise  # few bytes that stand for many
         return yaml.safe_load(file)
 
 

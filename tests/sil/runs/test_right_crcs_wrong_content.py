@@ -149,3 +149,11 @@ def test_a_summary_that_names_no_law_file(recorded: Path, tmp_path: Path) -> Non
     (folder / "summary.json").write_text('{"law_file": 7}')
     with pytest.raises(RunError, match="damaged"):
         replay(open_run(folder))
+
+
+def test_the_hash_of_a_law_file_in_a_run_without_one(recorded: Path, tmp_path: Path) -> None:
+    folder = altered(recorded, tmp_path / "run", Kind.META, with_values(law_file_sha256="0" * 64))
+    recover(folder)
+    report = replay(open_run(folder))
+    assert report.law_file == "law: not the law that flew: its file cannot be read: Is a directory"
+    assert report.identical
