@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from protocol import messages
@@ -46,7 +46,7 @@ from protocol.messages import (
 from protocol.refusals import BadCrc, BadLength, BadValue, BadVersion, CannotPack, TooLong, TooShort, UnknownType
 from protocol.refusals import BadPacket as BadPacket
 
-__all__ = ["BadPacket", "has_right_crc", "pack", "unpack", "unpack_checked"]
+__all__ = ["BadPacket", "has_right_crc", "in_sequence", "pack", "unpack", "unpack_checked"]
 __all__ += messages.__all__
 
 
@@ -93,6 +93,7 @@ def unpack_checked(packet: bytes) -> Packet:
 
 
 _HEADER = struct.Struct("<" + struct_format(HEADER))
+_HALF = 0x8000  # of the numbers there are
 _RESIDUE = 0x2144DF1C  # CRC-32 of any data followed by its own CRC, as zlib gives it
 
 
@@ -115,6 +116,14 @@ _TICK, _TIMING, _STOP = (_fixed(t) for t in (Type.TICK, Type.TIMING, Type.STOP))
 _SAMPLES = tuple(_with_readings(present) for present in range(8))
 _WORDS = tuple(struct.Struct(f"<{n}i") for n in range(MAX_TELEMETRY_WORDS + 1))
 _PRESENT_AT = HEADER_SIZE + 3 * 12 + 4 + 4 + 1  # offset of `present` in a SAMPLE packet
+
+
+def in_sequence(packets: Iterable[bytes]) -> list[bytes]:
+    """Packets of one answer, in any order, by their numbers, which may pass from 65535 to 0 among them."""
+    numbered = [(int.from_bytes(packet[2:4], "little"), packet) for packet in packets]
+    numbers = [number for number, _ in numbered]
+    shift = _HALF if numbers and max(numbers) - min(numbers) >= _HALF else 0
+    return [packet for _, packet in sorted(numbered, key=lambda each: (each[0] + shift) % (2 * _HALF))]
 
 
 # -- pack: (frame, sequence) -> header and body ----------------------------------------------------------------------

@@ -158,7 +158,7 @@ def _is_answer(row: PacketRow) -> bool:
 def _recorded(tick: int, rows: list[PacketRow], open_end: bool, last: bool) -> RecordedTick:
     sample = next((row for row in rows if row.type == Type.SAMPLE), None)
     answer = tuple(row.packet for row in rows if _is_answer(row))
-    ordered = tuple(sorted(answer, key=lambda packet: int.from_bytes(packet[2:4], "little")))
+    ordered = tuple(frames.in_sequence(answer))
     used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
     reported = [_frame(packet) for packet in ordered if packet[TYPE_AT] == Type.EVENT]
     stale = tuple(event.a for event in reported if event is not None and event.code == events.STALE_SAMPLE)

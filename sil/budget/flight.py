@@ -26,7 +26,8 @@ MANOEUVRE_A = (
     "link.url=inproc",
     "require=[]",
 )
-TYPE_AT, SEQUENCE_AT = 1, slice(2, 4)  # of a packet
+TYPE_AT = 1  # of a packet
+NUMBERS = 2**16
 
 
 @dataclass(frozen=True)
@@ -94,11 +95,7 @@ def _ticks(grouped: Iterable[tuple[int, list[_Row]]]) -> Iterator[tuple[bytes, t
     """In lockstep the board gets TICK where the link lost the SAMPLE."""
     for number, (tick, rows) in enumerate(grouped):
         sent = next(row for row in rows if not row.down)
-        packet = sent.packet if sent.delivered else frames.pack(Tick(tick), number)
-        answer = sorted((row.packet for row in rows if row.down), key=_sequence)
+        packet = sent.packet if sent.delivered else frames.pack(Tick(tick), number % NUMBERS)
+        answer = frames.in_sequence(row.packet for row in rows if row.down)
         if answer:
             yield packet, tuple(answer)
-
-
-def _sequence(packet: bytes) -> int:
-    return int.from_bytes(packet[SEQUENCE_AT], "little")

@@ -120,3 +120,12 @@ def test_sizes_that_spec_promises() -> None:
     assert sizes["Event"] == 24
     assert sizes["Hello"] == 56
     assert (f.MAX_CONFIG_WORDS, f.MAX_TELEMETRY_WORDS) == (57, 58)
+
+
+@given(first=st.integers(0, 0xFFFF), count=st.integers(0, 18), random=st.randoms())
+def test_packets_of_an_answer_come_into_their_order_over_the_end_of_the_numbers(first, count, random):
+    """COMMAND(32767) may be number 65535 and its TELEMETRY number 0."""
+    answer = [f.pack(f.Event(32767, 1, 2, 3), (first + i) % 2**16) for i in range(count)]
+    shuffled = list(answer)
+    random.shuffle(shuffled)
+    assert f.in_sequence(shuffled) == answer
