@@ -10,6 +10,9 @@
 
 #include "../../core/board.h"
 
+/* What the library gives away, also where it is compiled to keep everything else to itself. */
+#define EXPORTED __attribute__((visibility("default")))
+
 /* Why host_serve() returned. */
 enum {
     HOST_STOPPED = 0,     /* once, and a session was stopped */
@@ -38,9 +41,9 @@ typedef struct {
 } host_link;
 
 /* Serves the link; `once`: until a session was stopped. Returns link->why. One at a time in a process. */
-int host_serve(host_link *link, bool once);
+EXPORTED int host_serve(host_link *link, bool once);
 
 /* Bytes of a board, for a hal that somebody else makes (the tests do). */
-size_t host_board_size(void);
+EXPORTED size_t host_board_size(void);
 
 #endif
