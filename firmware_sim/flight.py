@@ -16,7 +16,7 @@ from firmware_sim.controllers import inputs
 from firmware_sim.guidance.reference import Reference
 from protocol import events, frames
 from protocol.frames import Command, Event, Sample, Telemetry
-from protocol.law_tables import FORM_FLOAT, Configuration, LawTable, parse_configuration, refusal
+from protocol.law_tables import FORM_FLOAT, STALE_REUSE, Configuration, LawTable, parse_configuration, refusal
 
 INT32_MAX = 2**31 - 1
 EVENTS_PER_ANSWER = 16  # further ones are only counted
@@ -45,6 +45,7 @@ class Flight:
         self._needs = common["readings_mask"]
         self._float = common["form"] == FORM_FLOAT
         self._setpoint_from_sample = common["setpoint_source"] == 1
+        self._reuse = common["stale"] == STALE_REUSE
         self._rows = configuration.rows
         self._si = inputs.si_scale(common)
         self._torque_unit = 2.0 ** -common["torque_bits"]
@@ -89,6 +90,7 @@ class Flight:
         self._row = 0
         self._setpoint = (0, 0, 0)
         self._good_run = 0
+        self._has_reading = self._reused = False
         self._since_sample = 0
         self._watchdog = False
         self._arithmetic = False
@@ -140,14 +142,16 @@ class Flight:
         """Execution model and validity: (the sample is used, it was an overrun).
 
         start = max(arrival, free_at); free_at = start + answer_delay; a SAMPLE that arrives before free_at finds the
-        one-deep mailbox taken.
+        one-deep mailbox taken. Where CONFIG says `stale: reuse`, the last reading passes for this tick's instead.
         """
         start_ns = tick * self.period_ns
         start_ns += self.sample_timeout_ns if sample is None else sample.transit_us * 1000
         overrun = sample is not None and start_ns < self._free_at_ns
         self._free_at_ns = max(start_ns, self._free_at_ns) + self._answer_delay_ns
         usable = sample is not None and not overrun and (sample.valid & self._needs) == self._needs
-        self._good_run = self._good_run + 1 if usable else 0
+        self._reused = self._reuse and self._has_reading and not usable
+        self._has_reading |= usable
+        self._good_run = self._good_run + 1 if usable or self._reused else 0
         self._lost += not usable
         self._overruns += overrun
         return usable, overrun
@@ -163,9 +167,12 @@ class Flight:
             self._row += 1
 
     def _fill(self, tick: int, sample: Sample | None) -> None:
-        """The law's inputs in wire units; what acts now is the lab's word, without it the board's own last command."""
+        """The law's inputs in wire units; what acts now is the lab's word, without it the board's own last command.
+
+        Readings and momentum stay as they were while no sample comes.
+        """
         wire = self._wire
-        wire[inputs.FRESH] = int(sample is not None)
+        wire[inputs.FRESH] = int(sample is not None or self._reused)
         wire[inputs.GOOD_RUN] = self._good_run
         wire[inputs.APPLIED_KNOWN] = int(sample is not None)
         wire[inputs.TICK] = tick
@@ -227,6 +234,8 @@ class Flight:
         self, tick: int, torque: tuple[int, int, int], flags: int, usable: bool, notices: list[Event]
     ) -> list[Command | Telemetry | Event]:
         used = frames.USED if usable else frames.PROPAGATED if self._law.has_model else frames.REPEATED
+        if self._reused:
+            used = frames.REUSED
         if self._restarted:
             used, self._restarted = frames.RESTARTED, False
         notices = notices[:EVENTS_PER_ANSWER]

@@ -24,7 +24,7 @@ from protocol.messages import (
     PROTOCOL_VERSION,
     QUATERNION,
     RATE,
-    RESTARTED,
+    REUSED,
     ROLE_BOARD,
     USED,
     ZERO,
@@ -155,8 +155,8 @@ def _pack_sample(f: Sample, sequence: int) -> bytes:
 
 
 def _pack_command(f: Command, sequence: int) -> bytes:
-    if not USED <= f.used <= RESTARTED:
-        raise ValueError(f"used {f.used} is none of 1, 2, 3, 4")
+    if not USED <= f.used <= REUSED:
+        raise ValueError(f"used {f.used} is none of 1, 2, 3, 4, 5")
     return _COMMAND.pack(1, Type.COMMAND, sequence, f.tick, *f.torque, f.flags, f.follows, f.used)
 
 
@@ -281,8 +281,8 @@ def _bad_sample(tick: int, source: int, present: int, valid: int, reserved: int)
 def _read_command(packet: bytes, tick: int) -> Command:
     x, y, z, flags, follows, used = _exactly(_COMMAND, packet)
     _ticked(Type.COMMAND, tick)
-    if not USED <= used <= RESTARTED:
-        raise BadValue(Type.COMMAND, "used", used, "1, 2, 3 or 4")
+    if not USED <= used <= REUSED:
+        raise BadValue(Type.COMMAND, "used", used, "1, 2, 3, 4 or 5")
     return Command(tick, (x, y, z), flags, follows, used)
 
 

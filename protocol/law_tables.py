@@ -32,6 +32,7 @@ __all__ = ["INT32_MAX", "NO_LIMIT", "ConfigError", "Word", "dequantise", "lsb_of
 
 FORM_FIXED, FORM_FLOAT = 0, 1
 REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
+STALE_PROPAGATE, STALE_REUSE = 0, 1
 DESIGN_PRINTED, DESIGN_REPAIRED = 0, 1
 USER_LAW_ID = 0xFFFF
 READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
@@ -108,6 +109,7 @@ COMMON: tuple[Word, ...] = (
     Word("accel_limit", "2^-32 turn/sample^2", 0, 0, INT32_MAX, 0, "limit of the reference's acceleration, 0: none"),
     Word("setpoint_source", "", 0, 0, 1, 0, "where the set-point comes from", ("table", "sample")),
     Word("guidance_rows", "", 0, 0, 4096, 0, "number of guidance rows after the law's parameters"),
+    Word("stale", "", 0, 0, 1, 0, "without a usable SAMPLE", ("propagate", "reuse")),
 )
 
 ROW_WORDS = 4  # tick, x, y, z

@@ -117,7 +117,7 @@ LAYOUTS = (
             Field("torque", "i32", 3, "2^-torque_bits N m", "torque on the body, body axes"),
             Field("flags", "u16", 1, "mask", "see the table of flags"),
             Field("follows", "u8", 1, "", "how many TELEMETRY and EVENT frames of this tick follow"),
-            Field("used", "u8", 1, "", "1 used, 2 propagated, 3 repeated, 4 restarted"),
+            Field("used", "u8", 1, "", "1 used, 2 propagated, 3 repeated, 4 restarted, 5 reused"),
         ),
         "",
         "the answer to tick k",

@@ -14,7 +14,8 @@ NO_TICK = 0xFFFFFFFF
 HOUSEKEEPING = 0x80
 
 ZERO, FRESH, HELD = 0, 1, 2  # Sample.source
-USED, PROPAGATED, REPEATED, RESTARTED = 1, 2, 3, 4  # Command.used
+USED, PROPAGATED, REPEATED, RESTARTED, REUSED = 1, 2, 3, 4, 5  # Command.used
+WITHOUT_SAMPLE = (PROPAGATED, REPEATED, REUSED)  # Command.used of a step without a usable SAMPLE
 FLAG_SATURATED = 1 << 0  # torque at its limit
 FLAG_WATCHDOG = 1 << 1  # link watchdog: torque is zero
 FLAG_IDENTIFICATION_PAUSED = 1 << 2
@@ -186,12 +187,14 @@ __all__ = [
     "READY_UNKNOWN_LAW",
     "REPEATED",
     "RESTARTED",
+    "REUSED",
     "ROLE_BOARD",
     "ROLE_LAB",
     "STOP_DONE",
     "STOP_FAILED",
     "STOP_INTERRUPTED",
     "USED",
+    "WITHOUT_SAMPLE",
     "ZERO",
     "Command",
     "Config",

@@ -237,7 +237,7 @@ class Answers:
         now_ns = self._advanced_wall_ns = time.monotonic_ns()
         self._knows_us = False
         self._complete, self._followers = tick, command.follows
-        if command.used in (frames.PROPAGATED, frames.REPEATED) and tick in self._should_use:
+        if command.used in frames.WITHOUT_SAMPLE and tick in self._should_use:
             self._window.board_was_faster(tick)
         if tick == self._tick:
             self.last_answer_ns = now_ns - self._sent_wall_ns

@@ -59,6 +59,7 @@ def orders(scenario: Scenario) -> Orders:
         "rate_limit": _bam(guidance.rate_limit_degps or 0.0, period_s),
         "accel_limit": _bam(guidance.accel_limit_degps2 or 0.0, period_s**2),
         "setpoint_source": guidance.setpoint_source,
+        "stale": scenario.stale,
         **scenario.law_values(),
     }
     rows = guidance_rows(scenario)

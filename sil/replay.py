@@ -173,11 +173,11 @@ def _is_cut_off(answer: tuple[bytes, ...]) -> bool:
 
 
 def _stepped_without(answer: tuple[bytes, ...]) -> bool:
-    """The board's own timer was first: it propagated, though neither an overrun nor an invalid reading made it."""
+    """The board's own timer was first: no SAMPLE was used, though neither an overrun nor an invalid reading made it."""
     command = _frame(answer[0]) if answer else None
     if not isinstance(command, Command):
         return False
-    own_timer = command.used in (frames.PROPAGATED, frames.REPEATED) and not command.flags & frames.FLAG_OVERRUN
+    own_timer = command.used in frames.WITHOUT_SAMPLE and not command.flags & frames.FLAG_OVERRUN
     return own_timer and not any(_is_invalid_reading(packet) for packet in answer)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path as FilePath
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError
 
@@ -82,6 +82,9 @@ class Scenario(Section):
     """Misses in a row that hold the last torque; then zero."""
     link_limit: Annotated[int, Field(ge=1, le=1_000_000)] = 20
     """Ticks without a SAMPLE until the board commands zero."""
+    stale: Literal["propagate", "reuse"] = "propagate"
+    """Without a usable SAMPLE the law propagates its model; reuse gives it the last reading again as if it were fresh,
+    to show what harm that does."""
     restart_limit: Annotated[int, Field(ge=0, le=1000)] = 0
     """Unasked restarts of the board that the run survives in a new session; one more ends it with exit code 3."""
     sample_timeout_s: Annotated[float, Field(ge=0, le=60)] | None = None

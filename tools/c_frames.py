@@ -45,7 +45,7 @@ def header() -> str:
         ]) for layout in LAYOUTS),
         _enum("Readings at the end of SAMPLE: age, then values.", _readings()),
         _enum("SAMPLE's source.", _named("ZERO", "FRESH", "HELD", prefix="SOURCE_")),
-        _enum("COMMAND's used.", _named("USED", "PROPAGATED", "REPEATED", "RESTARTED", prefix="STEP_")),
+        _enum("COMMAND's used.", _named("USED", "PROPAGATED", "REPEATED", "RESTARTED", "REUSED", prefix="STEP_")),
         _enum("COMMAND's flags.", _named(*_constants("FLAG_"))),
         _enum("HELLO's role and flags.", _named("ROLE_LAB", "ROLE_BOARD", *_constants("HELLO_"))),
         _enum("READY's status and index.", [

@@ -53,7 +53,7 @@ def valid_frames() -> Iterator[tuple[str, int, f.Frame]]:
         21,
         f.Sample(0xFFFFFFFE, extreme, extreme, extreme, f.NO_TICK, 0xFFFFFFFF, f.ZERO, 0, (None,) * 3),
     )
-    for used in (f.USED, f.PROPAGATED, f.REPEATED, f.RESTARTED):
+    for used in (f.USED, f.PROPAGATED, f.REPEATED, f.RESTARTED, f.REUSED):
         yield f"command, used {used}", used, f.Command(used, (100, -200, 300), 1 << used, used, used)
     yield "command, extremes", 0xFFFF, f.Command(0xFFFFFFFE, extreme, 0xFFFF, 255, f.USED)
     yield "telemetry, no word", 5, f.Telemetry(9, 1, 1, ())
@@ -121,7 +121,7 @@ def invalid_packets() -> Iterator[tuple[str, str, bytes]]:
     yield "value", "stop with a tick", changed(stop, 4, bytes(4))
     yield "value", "stop, reserved", changed(stop, 10, b"\1")
     yield "value", "command, used 0", changed(command, 23, b"\0")
-    yield "value", "command, used 5", changed(command, 23, b"\5")
+    yield "value", "command, used 6", changed(command, 23, b"\6")
     yield "value", "config, part not below parts", changed(config, 8, b"\1\0")
     yield "value", "config, reserved", changed(config, 14, b"\1")
     yield "value", "event, reserved", changed(event, 10, b"\1")

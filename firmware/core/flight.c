@@ -54,7 +54,7 @@ static bool begin(flight *f) {
     memset(f->setpoint, 0, sizeof f->setpoint);
     f->next_row = 0;
     f->good_run = f->since_sample = 0;
-    f->watchdog = f->arithmetic = false;
+    f->watchdog = f->arithmetic = f->has_reading = f->reused = false;
     return f->law->init(&f->self, f->common, f->params);
 }
 
@@ -93,17 +93,23 @@ void flight_restart(flight *f, uint32_t expected, uint32_t tick) {
 /* -- one tick, in order ----------------------------------------------------------------------------------------------- */
 
 /* Execution model and validity: start = max(arrival, free_at), free_at = start + answer_delay; a SAMPLE that arrives before
- * free_at finds the one-deep mailbox taken. */
+ * free_at finds the one-deep mailbox taken. Where CONFIG says `stale: reuse`, the last reading passes for this tick's. */
 static bool admit(flight *f, uint32_t tick, const sample *s, bool *overrun) {
     int64_t start = tick * f->period_us + (s == NULL ? f->sample_timeout_us : (int64_t)s->transit_us);
     *overrun = s != NULL && start < f->free_at_us;
     f->free_at_us = (start > f->free_at_us ? start : f->free_at_us) + f->common[COMMON_ANSWER_DELAY_US];
     int32_t needs = f->common[COMMON_READINGS_MASK];
-    if (s != NULL && !*overrun && (s->valid & needs) == needs) {
+    bool usable = s != NULL && !*overrun && (s->valid & needs) == needs;
+    f->reused = !usable && f->has_reading && f->common[COMMON_STALE] == COMMON_STALE_REUSE;
+    if (usable || f->reused) {
         count(&f->good_run);
+    } else {
+        f->good_run = 0;
+    }
+    if (usable) {
+        f->has_reading = true;
         return true;
     }
-    f->good_run = 0;
     count(&f->lost);
     if (*overrun) {
         count(&f->overruns);
@@ -128,11 +134,13 @@ static void take_setpoint(flight *f, uint32_t tick, const sample *s) {
     }
 }
 
-/* The law's inputs; what acts now is the laboratory's word, without it the board's own COMMAND(k - n). */
+/* The law's inputs; what acts now is the laboratory's word, without it the board's own COMMAND(k - n). Readings and momentum
+ * stay as they were while no sample comes. */
 static void fill(flight *f, uint32_t tick, const sample *s) {
     law_input *in = &f->in;
     int32_t delay = f->common[COMMON_TRANSPORT_DELAY_TICKS];
-    in->fresh = in->applied_known = s != NULL;
+    in->fresh = s != NULL || f->reused;
+    in->applied_known = s != NULL;
     in->good_run = f->good_run;
     in->tick = tick;
     memcpy(in->setpoint, f->setpoint, sizeof in->setpoint);
@@ -236,7 +244,7 @@ void flight_step(flight *f, uint32_t tick, const sample *s, answer *a) {
         memcpy(f->sent[i], f->sent[i - 1], sizeof f->sent[i]);
     }
     memcpy(f->sent[0], a->torque, sizeof f->sent[0]);
-    a->used = usable ? STEP_USED : f->law->has_model ? STEP_PROPAGATED : STEP_REPEATED;
+    a->used = usable ? STEP_USED : f->reused ? STEP_REUSED : f->law->has_model ? STEP_PROPAGATED : STEP_REPEATED;
     if (f->restarted) {
         a->used = STEP_RESTARTED;
         f->restarted = false;

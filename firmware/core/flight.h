@@ -80,6 +80,7 @@ typedef struct {
     size_t next_row;
     int32_t good_run, since_sample;
     bool watchdog, arithmetic, restarted;
+    bool has_reading, reused; /* stale: reuse only: there is one; the last step was given it again */
 } flight;
 
 /* Begins with words that config_check() found right. False: the law refuses (READY, status 3). */

@@ -98,7 +98,7 @@ static bool values_are_right(const uint8_t *packet) {
     case TYPE_SAMPLE:
         return packet[SAMPLE_SOURCE_AT] <= SOURCE_HELD && packet[SAMPLE_RESERVED_AT] == 0 &&
                (packet[SAMPLE_VALID_AT] & ~packet[SAMPLE_PRESENT_AT]) == 0;
-    case TYPE_COMMAND: return packet[COMMAND_USED_AT] >= STEP_USED && packet[COMMAND_USED_AT] <= STEP_RESTARTED;
+    case TYPE_COMMAND: return packet[COMMAND_USED_AT] >= STEP_USED && packet[COMMAND_USED_AT] <= STEP_REUSED;
     case TYPE_EVENT: return get_u16(packet + EVENT_RESERVED_AT) == 0;
     case TYPE_HELLO: return packet[HELLO_ROLE_AT] <= ROLE_BOARD && is_build(packet + HELLO_BUILD_AT);
     case TYPE_STOP: return get_u16(packet + STOP_RESERVED_AT) == 0;

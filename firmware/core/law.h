@@ -14,7 +14,7 @@
 #include "reference.h"
 
 typedef struct law_input {
-    int32_t fresh;         /* 1: this tick's reading is there and used */
+    int32_t fresh;         /* 1: this tick's reading is there and used (or, by `stale: reuse`, an old one passed for it) */
     int32_t good_run;      /* readings used in a row, this one included */
     int32_t applied_known; /* 1: applied is the laboratory's word for what acts from t_k on */
     int32_t euler[3];      /* 2^-32 turn */

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-FRESH = 0  # 1: this tick's reading is there and used
+FRESH = 0  # 1: this tick's reading is there and used (or, by `stale: reuse`, an old one passed for it)
 GOOD_RUN = 1  # readings used in a row, this one included
 APPLIED_KNOWN = 2  # 1: APPLIED is the laboratory's word for what acts from t_k on, after all limits
 EULER = slice(3, 6)  # 2^-32 turn | rad

@@ -54,6 +54,7 @@ CHECKS = {
     "ticks: overrun": "sil.board_test.ticks:overrun",
     "ticks: invalid": "sil.board_test.ticks:invalid",
     "ticks: pause": "sil.board_test.ticks:identification",
+    "ticks: reuse": "sil.board_test.ticks:reuse",
     "ticks: set-point": "sil.board_test.ticks:setpoints",
     "ticks: events": "sil.board_test.ticks:many_events",
     "ticks: far": "sil.board_test.ticks:late_ticks",

@@ -15,6 +15,7 @@ USED = {
     frames.PROPAGATED: "propagated",
     frames.REPEATED: "repeated",
     frames.RESTARTED: "restarted",
+    frames.REUSED: "reused",
 }
 MOST_SHOWN = 5  # of a list of frames
 MOST_LINES = 4  # of what is wrong

@@ -253,6 +253,27 @@ def identification(at: Examinee) -> Finding:
     return passed("paused for two good samples, on with the third")
 
 
+def reuse(at: Examinee) -> Finding:
+    """B5, B6: where CONFIG says so, the last reading passes for a fresh one; counters and COMMAND tell the truth."""
+
+    def check(twin: Twin) -> None:
+        expect("TICK(0), before any reading", [f"0 {_without(twin)}"], _used(twin.send(Tick(0))))
+        for tick in range(1, 30):
+            twin.send(sample(tick))
+        for tick, out in ((30, Tick(30)), (31, sample(31, valid=0))):
+            got = twin.send(out)
+            expect(f"tick {tick}", [f"{tick} reused"], _used(got))
+            expect(f"tick {tick}: its last event", "SAMPLE_LOST", (_codes(got) or ["none"])[-1])
+            expect(f"tick {tick}: samples lost", tick - 28, word(got, LOST))
+            paused = bool(the_command(got).flags & frames.FLAG_IDENTIFICATION_PAUSED)
+            expect(f"tick {tick}: identification paused", False, paused)
+        expect("TICK ahead by 9", ["40 restarted"], _used(twin.send(Tick(40))))
+        expect("TICK behind a re-start", [f"41 {_without(twin)}"], _used(twin.send(Tick(41))))
+
+    _each(at, check, stale="reuse")
+    return passed("`stale: reuse`: the last reading as if it were fresh, none where there is none")
+
+
 def setpoints(at: Examinee) -> Finding:
     """B9: of the last guidance row whose tick is not after k; or of SAMPLE, kept while none comes."""
     first = [word.name for word in TELEMETRY_COMMON].index("setpoint_x")

@@ -113,7 +113,7 @@ COMMAND = Layout(
         Field("uint32", "tick", 1, "tick it was computed at"),
         Field("int32", "torque_lsb", 3, "the same in wire units, 2^-torque_bits N m"),
         Field("uint16", "flags", 1, "bits as in protocol/SPEC.md"),
-        Field("uint8", "used", 1, "1 sample used, 2 propagated, 3 repeated, 4 restarted"),
+        Field("uint8", "used", 1, "1 sample used, 2 propagated, 3 repeated, 4 restarted, 5 reused"),
         Field("uint8", "follows", 1, "number of TELEMETRY and EVENT frames that follow"),
         Field("uint8", "fate", 1, "0 delivered, 1 late, 2 dropped, 3 corrupted, 4 in flight"),
     ],

@@ -87,7 +87,7 @@ def test_refusals_say_what_was_expected_and_what_came() -> None:
     "frame",
     [
         f.Command(0, (2**31, 0, 0), 0, 0, f.USED),
-        f.Command(0, (0, 0, 0), 0, 0, 5),
+        f.Command(0, (0, 0, 0), 0, 0, 6),
         f.Command(0, (0, 0), 0, 0, f.USED),  # type: ignore[arg-type]
         f.Config(0, 1, 0, tuple(range(58))),
         f.Telemetry(0, 1, 1, tuple(range(59))),

@@ -154,7 +154,8 @@ enum {
     STEP_USED = 1,
     STEP_PROPAGATED = 2,
     STEP_REPEATED = 3,
-    STEP_RESTARTED = 4
+    STEP_RESTARTED = 4,
+    STEP_REUSED = 5
 };
 
 /* COMMAND's flags. */

@@ -4,8 +4,8 @@
 
 const range_scale RANGE_SCALES[] = {
     {4835703278458517, 4503599627370496, -82, 0, 10}, /* torque_bits: -1e-09 to inf */
-    {8589934600589943, 8589934600589943, -33, -33, 24}, /* kp_bits: -1000000.001 to 1000000.001 */
-    {8589934600589943, 8589934600589943, -33, -33, 25}, /* kd_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 25}, /* kp_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 26}, /* kd_bits: -1000000.001 to 1000000.001 */
 };
 
 const word_range COMMON_RANGES[COMMON_WORDS] = {
@@ -33,6 +33,7 @@ const word_range COMMON_RANGES[COMMON_WORDS] = {
     {0, INT32_MAX, NO_WORD}, /* accel_limit */
     {0, 1, NO_WORD}, /* setpoint_source */
     {0, 4096, NO_WORD}, /* guidance_rows */
+    {0, 1, NO_WORD}, /* stale */
 };
 
 static const word_range PD_RANGES[PD_WORDS] = {
@@ -78,7 +79,7 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
 };
 
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
-    {1, 1, 0x44316022, PD_RANGES, 5000, 10000000, {{0x1F, 0x06}}, PD_WORDS, 1, NO_WORD, NO_WORD}, /* pd */
-    {2, 1, 0x2434627A, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02}, {0x02, 0x04}}, MRAC_WORDS, 1, 0, 4}, /* mrac */
-    {3, 1, 0x5A37BA97, APPC_RANGES, 200000, 1000000, {{0x02, 0x04}}, APPC_WORDS, 1, NO_WORD, NO_WORD}, /* appc */
+    {1, 1, 0x5D6B03B6, PD_RANGES, 5000, 10000000, {{0x1F, 0x06}}, PD_WORDS, 1, NO_WORD, NO_WORD}, /* pd */
+    {2, 1, 0x7879CC71, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02}, {0x02, 0x04}}, MRAC_WORDS, 1, 0, 4}, /* mrac */
+    {3, 1, 0x28359648, APPC_RANGES, 200000, 1000000, {{0x02, 0x04}}, APPC_WORDS, 1, NO_WORD, NO_WORD}, /* appc */
 };

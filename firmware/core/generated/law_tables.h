@@ -36,7 +36,8 @@ enum {
     COMMON_ACCEL_LIMIT = 21,             /* 2^-32 turn/sample^2: limit of the reference's acceleration, 0: none */
     COMMON_SETPOINT_SOURCE = 22,         /* where the set-point comes from */
     COMMON_GUIDANCE_ROWS = 23,           /* number of guidance rows after the law's parameters */
-    COMMON_WORDS = 24
+    COMMON_STALE = 24,                   /* without a usable SAMPLE */
+    COMMON_WORDS = 25
 };
 
 /* CONFIG words of pd, from the law's first. */
@@ -157,6 +158,7 @@ enum {
 enum { COMMON_FORM_FIXED = 0, COMMON_FORM_FLOAT = 1 };
 enum { COMMON_REFERENCE_KIND_NONE = 0, COMMON_REFERENCE_KIND_ZOH = 1, COMMON_REFERENCE_KIND_PAPER = 2 };
 enum { COMMON_SETPOINT_SOURCE_TABLE = 0, COMMON_SETPOINT_SOURCE_SAMPLE = 1 };
+enum { COMMON_STALE_PROPAGATE = 0, COMMON_STALE_REUSE = 1 };
 enum { MRAC_DESIGN_PRINTED = 0, MRAC_DESIGN_REPAIRED = 1 };
 enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };

@@ -66,7 +66,7 @@ def _make_values_right(random: Random, body: bytearray) -> None:
             if present >> bit & 1:
                 body += random.randbytes(4 + 4 * words)
     elif type_ == Type.COMMAND and len(body) == 24:
-        body[23] = random.randrange(1, 5)
+        body[23] = random.randrange(1, 6)
     elif type_ in (Type.EVENT, Type.STOP) and len(body) >= 12:
         body[10:12] = b"\0\0"
     elif type_ == Type.HELLO and len(body) == 52:
@@ -132,6 +132,7 @@ def any_words(random: Random) -> tuple[int, ...]:
         "torque_limit": random.choice((0.0, 0.001, 0.1, math.inf, math.inf)),
         "transport_delay_ticks": random.randrange(5) if table.name == "pd" or random.random() < 0.1 else 1,
         "reference_kind": random.randrange(3),
+        "stale": random.randrange(2),
     }
     words = list(config_words(table, values, rows))
     for _ in range(random.choice((0, 0, 0, 0, 0, 0, 0, 0, 1, 2))):

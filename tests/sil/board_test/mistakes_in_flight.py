@@ -157,6 +157,29 @@ class ResumesEarly(Flight):
         self._good_run = real
 
 
+@wrong("`stale: reuse` is not looked at", "ticks: reuse")
+class NeverReuses(Flight):
+    def _admit(self, tick, sample):
+        self._reuse = False
+        return super()._admit(tick, sample)
+
+
+@wrong("`stale: reuse` outlives a re-start", "ticks: reuse")
+class ReusesOldTimes(Flight):
+    def _begin(self):
+        had = getattr(self, "_has_reading", False)
+        super()._begin()
+        self._has_reading = had
+
+
+@wrong("a reused sample is none that is lost", "ticks: reuse")
+class CountsReused(Flight):
+    def _admit(self, tick, sample):
+        usable, overrun = super()._admit(tick, sample)
+        self._lost -= self._reused
+        return usable, overrun
+
+
 @wrong("the set-point is gone where no SAMPLE comes", "ticks: set-point")
 class ForgetsSetpoint(Flight):
     def _take_setpoint(self, tick, sample):
