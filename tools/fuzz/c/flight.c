@@ -75,7 +75,7 @@ static void read_sample(input *in, sample *s, uint32_t tick) {
 
 static void judge(const flight *f, const answer *a) {
     EXPECT(a->words_count <= TELEMETRY_WORDS_MAX && f->events_count <= EVENTS_MAX);
-    EXPECT(a->used >= STEP_USED && a->used <= STEP_RESTARTED);
+    EXPECT(a->used >= STEP_USED && a->used <= STEP_REUSED);
     for (size_t axis = 0; axis < 3; axis++) {
         int64_t limit = f->common[COMMON_TORQUE_LIMIT_X + axis];
         limit = limit < 0 ? -limit : limit; /* -1 passes for 0: a range leaves room for rounding */
