@@ -238,10 +238,11 @@ def _base(
 ) -> Scenario:
     """The scenario in lockstep, and in process, unless it has no board or somebody said how it is to be reached.
 
-    To vary a key of board or link says so too: in process all values would be alike.
+    To vary board or link.url says so too: in process all values would be alike. What the link does to frames is a model,
+    and acts in process as anywhere.
     """
     own = scenario_from(name, sets, clock=clock, link=link, board=board)
-    how = any(key.partition(".")[0] in ("board", "link") for key in varied)
+    how = any(key in ("board", "link", "link.url") for key in varied)
     said = {text.partition("=")[0] for text in sets}
     before = [] if clock is not None or said & {"clock", "clock.mode"} else ["clock.mode=lockstep"]
     if own.board != "none" and link is None and board is None and not how and not said & {"board", "link", "link.url"}:
