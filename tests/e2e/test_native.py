@@ -50,19 +50,6 @@ def test_over_either_link_and_with_a_busy_board(tmp_path: Path, link: str) -> No
     assert native["sha256"] == python["sha256"]
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_stale_readings_are_reused_alike_and_replayed(tmp_path: Path, law: str) -> None:
-    """`stale: reuse` where every second SAMPLE finds the board busy; another run than with `propagate`."""
-    sets = ("duration_s=60", "answer_delay_s=0.6", "expect_missed=true")
-    python = fly(tmp_path / "python", law, "inproc", *sets, "stale=reuse")
-    native = fly(tmp_path / "native", law, "native", *sets, "stale=reuse")
-    other = fly(tmp_path / "other", law, "native", *sets)
-    assert native["sha256"] == python["sha256"] != other["sha256"]
-    report = replay(open_run(tmp_path / "python"), (), "native")
-    assert (report.identical, report.ticks, report.config) == (True, 120, [])
-    assert (open_run(tmp_path / "python").commands["used"] == frames.REUSED).sum() > 50
-
-
 def test_on_a_clock_it_gives_the_lockstep_bytes(tmp_path: Path) -> None:
     """With its own timer. A real miss makes this inconclusive: repeated at most three times, then reported as such."""
     expected = fly(tmp_path / "lockstep", "appc", "inproc", "duration_s=40")["sha256"]
