@@ -9,11 +9,11 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sil.pil.library import compilers
+from tools.check_c_operations import law_files
 
 HERE = Path(__file__).parent
 CORE = HERE.parents[2] / "firmware" / "core"
 WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-Werror"]
-LAW_FILES = ["fixed", "reference", "kinematics", "gain", "gyroscopic", "rls", "pd", "mrac", "appc", "laws"]
 
 
 def compiler() -> list[str]:
@@ -27,8 +27,8 @@ def zig() -> list[str]:
 
 
 def law_sources(core: Path = CORE) -> list[Path]:
-    """What the laws are made of."""
-    return [core / f"{name}.c" for name in LAW_FILES]
+    """What the laws are made of: all of core but the board."""
+    return [core / "fixed.c", *(path for path in law_files(core) if path.suffix == ".c")]
 
 
 def build(
