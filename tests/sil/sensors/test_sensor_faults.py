@@ -123,7 +123,7 @@ def test_wrong_rate():
     made = flown("rate", {"kind": "wrong", "bias_degps": 0.1, "scale": -1})
     bias = round(math.radians(0.1) * 2**28)
     assert made[10] == (tuple(-value + bias for value in GOOD["rate"][10][0]), 0, True)
-    assert flown("rate", {"kind": "wrong", "scale": 1e9})[10][0] == (2**31 - 1, -(2**31) + 1, 2**31 - 1)
+    assert flown("rate", {"kind": "wrong", "scale": 1e6})[10][0] == (2**31 - 1, -(2**31) + 1, 2**31 - 1)
 
 
 def test_wrong_star_tracker_is_turned_about_a_body_axis():
