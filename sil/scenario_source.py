@@ -154,7 +154,7 @@ def _replaced(data: Any, path: Path, value: Any, whole: Path) -> Any:
     if isinstance(part, int):
         if not isinstance(data, tuple) or part >= len(data):
             got = f"{len(data)} of them" if isinstance(data, tuple) else shown(data)
-            key = ".".join(map(str, whole))
+            key = ".".join(printable(str(each)) for each in whole)
             raise ScenarioInvalid([Problem(f"--set {key}", key, f"a list with an item {part}", got)])
         return (*data[:part], _replaced(data[part], rest, value, whole), *data[part + 1 :])
     below = data if isinstance(data, dict) else {}
