@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,6 +58,16 @@ def alive(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
+
+
+def all_gone(pids: Iterable[int], within_s: float = 5.0) -> bool:
+    """None of these processes is there any more; one whose parent has died needs a moment to notice."""
+    give_up = time.monotonic() + within_s
+    left = [pid for pid in pids if alive(pid)]
+    while left and time.monotonic() < give_up:
+        time.sleep(0.02)
+        left = [pid for pid in left if alive(pid)]
+    return not left
 
 
 def quiet(pid: int) -> None:

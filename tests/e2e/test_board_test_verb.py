@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 from cables import Cable
-from subprocesses import Cli, alive, children_of
+from subprocesses import Cli, all_gone, children_of
 
 from protocol import frames
 
@@ -118,4 +118,4 @@ def test_its_own_board_does_not_outlive_it(cli: Cli) -> None:
         process.kill()
     assert process.returncode == 130, err
     assert children
-    assert not any(map(alive, children))
+    assert all_gone(children)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from cables import Cable
-from subprocesses import Cli, alive, children_of
+from subprocesses import Cli, all_gone, children_of
 
 from protocol import frames
 
@@ -83,7 +83,7 @@ def test_its_own_board_process_does_not_outlive_it(cli: Cli) -> None:
         process.kill()
     assert process.returncode == 130, err
     assert children
-    assert not any(map(alive, children))
+    assert all_gone(children)
 
 
 def test_no_such_device_and_no_such_link(cli: Cli) -> None:

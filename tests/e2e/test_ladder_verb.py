@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from subprocesses import Cli, alive, children_of
+from subprocesses import Cli, all_gone, children_of
 
 SHORT = ("ladder", "mrac-rs232", "--set", "duration_s=20", "--set", "require=[]")
 
@@ -100,7 +100,7 @@ def test_interrupted_it_keeps_what_was_flown_and_leaves_nobody_behind(cli: Cli, 
         process.kill()
     assert process.returncode == 130, err
     assert children
-    assert not any(map(alive, children))
+    assert all_gone(children)
     content = json.loads(out)
     assert (content["verdict"], content["exit_code"]) == ("interrupted", 130)
     assert [rung["verdict"] for rung in content["rungs"]] == ["interrupted"]
