@@ -35,7 +35,9 @@ HOUR_S = 3600.0
 LOOK_EVERY_ticks = 1000
 SETTLED = 0.1  # of the run: what is allocated before it says nothing of a leak
 SLOPE_LIMIT_kB = 16.0  # per 1000 ticks: twice what the list of answer times needs
+STARTED_ticks = 20  # answers to a CONFIG that was sent again while the board compiled may come until then
 REMEMBERED_ticks = 600  # a row may be written so many ticks later
+ENOUGH_looks = 50  # for a slope that means something
 SHOWN = 5
 
 
@@ -150,7 +152,9 @@ def soak(scenario: Scenario, out: Path) -> dict[str, Any]:
     wrong = list(balance.wrong)
     wrong += [f"raised: {raised}"] if raised else []
     wrong += [f"the run: {summary['reason']}: {summary['failure']}"] if summary.get("reason") != "finished" else []
-    wrong += [f"{name}: {value:.1f} kB per 1000 ticks" for name, value in slopes.items() if value > SLOPE_LIMIT_kB]
+    long_enough = len(onlooker.looks) >= ENOUGH_looks
+    too_steep = [name for name, value in slopes.items() if value > SLOPE_LIMIT_kB and long_enough]
+    wrong += [f"{name}: {slopes[name]:.1f} kB per 1000 ticks" for name in too_steep]
     wrong += [f"{count} x {what}" for what, count in timeouts.items() if count]
     return {
         "scenario": scenario.name,
@@ -194,7 +198,7 @@ def slope_kB(looks: list[Look], name: str) -> float:
 def timeouts_used(balance: Balance) -> dict[str, int]:
     """What only a wall-clock timeout sends: a HELLO again, a CONFIG again (which is answered with READY again).
 
-    From tick 0 on: before it, a board may take its time to compile.
+    In flight: before it, a board may take its time to compile.
     """
     up, down = Direction.UP, Direction.DOWN
     return {
@@ -218,7 +222,7 @@ def balanced(journal: Path) -> Balance:
             balance.events[code] += 1
             if code in (getattr(events, "BOARD_OFF", -1), events.BOARD_RESTARTED):
                 off |= set(range(a - 2, a + 8))
-        elif record.kind == Kind.HOUSEKEEPING and balance.sessions:
+        elif record.kind == Kind.HOUSEKEEPING and record.tick > STARTED_ticks:
             direction, _, packet = read_housekeeping(record.payload)
             balance.housekeeping[direction, packet[1]] += 1
         elif record.kind == Kind.COMMIT and record.tick % REMEMBERED_ticks == 0:
