@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN     = $(VENV)/bin
 JOBS   ?= 2
 
-.PHONY: check lint types imports test golden firmware bench clean
+.PHONY: check lint types imports test golden firmware bench fuzz soak clean
 
 check: lint types imports test
 
@@ -43,6 +43,13 @@ firmware: $(VENV)/.installed
 
 bench: $(VENV)/.installed
 	$(BIN)/sil bench
+
+# Not part of check: ten minutes for each of eight targets; and 24 simulated hours.
+fuzz: $(VENV)/.installed
+	$(BIN)/python -m tools.fuzz
+
+soak: $(VENV)/.installed
+	$(BIN)/python -m tools.soak
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info tests/e2e/node_modules
