@@ -1,6 +1,6 @@
 /* What the board needs of its hardware: a clock, a wait for bytes, a way out, a watchdog. Same names as firmware_sim/hal.py.
  *
- * The board never asks which hal it has. No function may block except wait, none may allocate, and none is called from an
+ * The board never asks which hal it has. Only wait and write may block, none may allocate, and none is called from an
  * interrupt. Times are integer nanoseconds of a clock that never goes backwards.
  */
 #ifndef CORE_HAL_H

@@ -18,7 +18,7 @@ _Static_assert(HSE_MHZ >= 4u && HSE_MHZ <= 26u, "the crystal of an STM32F405 has
 #define HSI_HZ 16000000u
 #define PLL_HZ 168000000u
 #define BAUD 115200u
-#define SPINS 200000u /* patience with an oscillator: some 50 ms at 16 MHz; crystals take a few */
+#define SPINS 200000u /* some 160 ms at 16 MHz; a crystal takes a few, and the watchdog bites after 0.68 s */
 
 #define RCC_CR REGISTER(0x40023800u)
 #define CR_HSE_ON (1u << 16)
@@ -46,6 +46,7 @@ _Static_assert(HSE_MHZ >= 4u && HSE_MHZ <= 26u, "the crystal of an STM32F405 has
 #define PWR_CR REGISTER(0x40007000u)
 #define PWR_SCALE_1 (1u << 14) /* what 168 MHz needs */
 #define FLASH_ACR REGISTER(0x40023C00u)
+#define FLASH_WAITS 7u
 #define FLASH_FIVE_WAITS (5u | 1u << 8 | 1u << 9 | 1u << 10) /* with prefetch and both caches */
 
 #define GPIOA_MODE REGISTER(0x40020000u)
@@ -141,6 +142,7 @@ static uint32_t core_start(void) {
     RCC_CR |= CR_PLL_ON | CR_CSS_ON;
     if (!comes(&RCC_CR, CR_PLL_READY, CR_PLL_READY)) return HSI_HZ;
     FLASH_ACR = FLASH_FIVE_WAITS;
+    if (!comes(&FLASH_ACR, FLASH_WAITS, FLASH_FIVE_WAITS & FLASH_WAITS)) return HSI_HZ;
     RCC_CFGR = CFGR_PRESCALERS;
     RCC_CFGR = CFGR_PRESCALERS | CFGR_TO_PLL;
     if (comes(&RCC_CFGR, CFGR_SWITCH << 2, CFGR_ON_PLL)) return PLL_HZ;
