@@ -58,9 +58,14 @@ class Disconnected:
     def __init__(self, good: Channel, outages: Sequence[Outage]) -> None:
         self._good, self._outages = good, tuple(outages)
 
-    def fate(self, direction: str, tick: int, frame_type: int, copy: int, encoded_len: int, t_ns: int) -> Fate:
-        """The good channel's decision, unless an outage takes the frame."""
-        fate = self._good.fate(direction, tick, frame_type, copy, encoded_len, t_ns)
+    def fates(
+        self, direction: str, tick: int, frame_type: int, number: int, encoded_len: int, t_ns: int
+    ) -> tuple[Fate, ...]:
+        """The good channel's decisions, but for the copies that an outage takes."""
+        good = self._good.fates(direction, tick, frame_type, number, encoded_len, t_ns)
+        return tuple([self._decided(tick, t_ns, fate) for fate in good])
+
+    def _decided(self, tick: int, t_ns: int, fate: Fate) -> Fate:
         for outage in self._outages:
             if outage.takes(tick, t_ns, fate.arrival_ns):
                 return Fate(False, fate.arrival_ns, outage.cause)

@@ -82,6 +82,16 @@ class Port:
             for packet in packets:
                 self._tap("tx", packet)
 
+    def write_altered(self, encoded: bytes) -> None:
+        """Put bytes on the link that were those of a frame once: between zeros on a byte stream, else as a datagram.
+
+        The other end's decoder discards them; they are no frame, and are neither counted nor tapped.
+        """
+        if not self.link.datagram:
+            self.link.send(b"\0" + encoded + b"\0")
+        elif encoded:
+            self.link.send(encoded)
+
     def pack(self, frame: Frame) -> bytes:
         """Give the frame its sequence number and make its packet, for a later `write` (or several, when repeated)."""
         which = 1 if type(frame) in HOUSEKEEPING_FRAMES else 0

@@ -12,7 +12,8 @@ S = 1_000_000_000
 
 
 def fate(channel, sent_ns, tick=0, direction=TO_BOARD, size=63):
-    return channel.fate(direction, tick, Type.SAMPLE, 0, size, sent_ns)
+    (one,) = channel.fates(direction, tick, Type.SAMPLE, 0, size, sent_ns)
+    return one
 
 
 @pytest.mark.parametrize("direction", [TO_BOARD, TO_LAB])
@@ -29,6 +30,15 @@ def test_a_frame_that_is_on_the_wire_when_the_link_goes_down_is_lost():
     wire_ns = fate(Clear(115200), 0).arrival_ns
     assert not fate(channel, 10 * S - wire_ns).delivered
     assert fate(channel, 10 * S - wire_ns - 1).delivered
+
+
+def test_each_copy_is_taken_by_its_own_arrival():
+    class Twice:
+        def fates(self, direction, tick, frame_type, number, encoded_len, t_ns):
+            return Fate(True, t_ns + 1), Fate(True, t_ns + 5)
+
+    channel = Disconnected(Twice(), [Disconnect(10 * S + 3, 12 * S)])
+    assert [each.delivered for each in channel.fates(TO_BOARD, 0, Type.SAMPLE, 0, 63, 10 * S)] == [True, False]
 
 
 def test_without_an_end_it_is_down_for_good():
@@ -50,9 +60,9 @@ class Lossy:
     def __init__(self):
         self.asked = 0
 
-    def fate(self, direction, tick, frame_type, copy, encoded_len, t_ns):
+    def fates(self, direction, tick, frame_type, number, encoded_len, t_ns):
         self.asked += 1
-        return Fate(False, t_ns, "drop")
+        return (Fate(False, t_ns, "drop"),)
 
 
 def test_one_decision_per_frame_and_the_outage_is_the_cause():

@@ -17,8 +17,8 @@ from protocol.config import MAX_WORDS, Assembly, TooManyWords, split
 
 def test_a_clear_channel_takes_ten_bits_per_byte() -> None:
     channel = Clear(115200)
-    assert channel.fate(TO_BOARD, 7, f.Type.SAMPLE, 0, 79, 500) == Fate(True, 500 + 6_857_639, "")
-    assert Clear(None).fate(TO_BOARD, 7, f.Type.SAMPLE, 0, 79, 500) == Fate(True, 500, "")
+    assert channel.fates(TO_BOARD, 7, f.Type.SAMPLE, 0, 79, 500) == (Fate(True, 500 + 6_857_639, slow="wire"),)
+    assert Clear(None).fates(TO_BOARD, 7, f.Type.SAMPLE, 0, 79, 500) == (Fate(True, 500),)
     assert wire_time_ns(1, 10_000_000_000) == 1
     assert wire_time_ns(1, 3) == 3_333_333_334
 
