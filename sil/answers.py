@@ -1,7 +1,7 @@
 """What the laboratory knows of the board while a run goes on: samples sent, answers received, what is missing.
 
 A tick's answer is COMMAND(k) and the TELEMETRY and EVENT frames it announces. In lockstep `drain` waits for the whole
-answer; in real time it takes what is there. The modelled arrival alone decides whether a command is in time.
+answer; in real time it takes what is there. The channel's model alone decides what arrives and whether it is in time.
 Where the board restarts, unasked or as the scenario says, what it has not answered stays unanswered, and a new session
 is opened (rejoin.py): in lockstep `drain` waits for it, too; a paced clock goes on, and its ticks are misses.
 """
@@ -10,21 +10,20 @@ from __future__ import annotations
 
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from protocol import frames
-from protocol.channel import TO_BOARD, TO_LAB, Channel, Fate
+from protocol.channel import TO_BOARD, TO_LAB, Channel
 from protocol.frames import Command, Packet, Sample, Telemetry, Tick, Type
 from protocol.port import Port
 from sil.commands import CommandWindow, ExecutionModel
+from sil.fates import ENCODED_EXTRA, Copy, Stale, copies_of, first_arrival_ns, first_of
 from sil.rejoin import Rejoin
 from sil.session import says_restart
 from sil.signals import Recorder
 from sil.sinks.journal import NO_ANSWER, Direction
-from sil.sinks.journal import Fate as Outcome
 from sil.trouble import LinkFailure
 
-ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
 LOOK_EVERY_S = 0.25
 ASK_AFTER_S = 1.0  # of silence, and as often: a board that restarted may have had nobody to tell
 INTERRUPTED_WAIT_ns = 1_000_000_000
@@ -44,6 +43,7 @@ class Answers:
         window: CommandWindow,
         recorder: Recorder,
         torque_Nm: float,
+        sample_timeout_ns: int,
         lockstep: bool,
         check_alive: Callable[[], None],
         dead_after_s: float,
@@ -51,12 +51,16 @@ class Answers:
     ) -> None:
         self._port, self._channel, self._model, self._window = port, channel, model, window
         self._recorder, self._torque_Nm, self._lockstep = recorder, torque_Nm, lockstep
+        self._sample_timeout_ns = sample_timeout_ns
         self._check_alive, self._dead_after_s = check_alive, dead_after_s
         self._rejoin = rejoin
         self._first = 0  # tick the session began with
         self._tick = -1  # newest tick a SAMPLE was sent for, or would have been, had there been a session
         self._complete = -1  # newest tick of which no more is to come: its whole answer is here, or the board lost it
         self._followers = 0  # frames still to come of the answer under way
+        self._events = 0  # of the answer under way that are here
+        self._timer_runs = False  # of the board: a SAMPLE of this session was in time
+        self._stale = Stale()
         self._done_ns: dict[int, int] = {}
         self._should_use: set[int] = set()  # ticks whose SAMPLE the board has in time, by the model
         self._early: list[Packet] = []  # answers to ticks that are still to come: the board's own timer was faster
@@ -72,7 +76,7 @@ class Answers:
     # -- up ------------------------------------------------------------------------------------------------------
 
     def send(self, sample: Sample, t_ns: int) -> None:
-        """SAMPLE(k), or in lockstep TICK(k) where the link does not deliver it (TICK is never faulted)."""
+        """SAMPLE(k); where the link does not deliver it in time TICK(k), or nothing if the board's own timer steps."""
         tick = self._tick = sample.tick
         self.last_answer_ns = NO_ANSWER
         if self._rejoin.switches_off(tick):
@@ -81,26 +85,49 @@ class Answers:
             self._without_board(tick)
             return
         if self._rejoin.begins(tick):
-            self._first = tick
+            self._first, self._timer_runs = tick, False
             self._model.restart(tick)
         if not self._sample_size:
             self._sample_size = len(frames.pack(sample, 0)) + ENCODED_EXTRA
-        fate = self._channel.fate(TO_BOARD, tick, Type.SAMPLE, 0, self._sample_size, t_ns)
-        transit_us = (fate.arrival_ns - t_ns) // 1000
+        fates = self._channel.fates(TO_BOARD, tick, Type.SAMPLE, 0, self._sample_size, t_ns)
+        transit_us = (first_arrival_ns(fates, self._sample_size) - t_ns) // 1000
         packet = self._port.pack(sample._replace(transit_us=transit_us))
+        copies = copies_of(packet, fates)
         self._sent_wall_ns = time.monotonic_ns()
-        if fate.delivered:
-            self._port.write(packet)
-        elif self._lockstep:
-            self._port.send(Tick(tick))
-        self._recorder.packet(tick, Direction.UP, Outcome.DELIVERED if fate.delivered else Outcome.DROPPED, packet)
-        self._done_ns[tick] = self._model.done_ns(tick, transit_us * 1000 if fate.delivered else None)
-        if fate.delivered and not self._model.overrun and sample.valid == self._valid_mask(sample):
+        stepped = self._put(tick, t_ns, copies)
+        for copy in copies:
+            in_time = copy.arrival_ns <= t_ns + self._sample_timeout_ns
+            self._record(tick, Direction.UP, packet, copy, in_time, copy.fate.slow)
+        self._done_ns[tick] = self._model.done_ns(tick, transit_us * 1000 if stepped else None)
+        if stepped and not self._model.overrun and sample.valid == self._valid_mask(sample):
             self._should_use.add(tick)
         self._done_ns.pop(tick - REMEMBERED_TICKS, None)
         self._should_use.discard(tick - REMEMBERED_TICKS)
         if self._early:
             self._take_early()
+
+    def _put(self, tick: int, t_ns: int, copies: Sequence[Copy]) -> bool:
+        """Copies of SAMPLE(tick) on the real link, behind stale ones that are there by now. True: one is in time."""
+        first = first_of(copies)
+        in_time = first is not None and first.arrival_ns <= t_ns + self._sample_timeout_ns
+        for copy in copies:
+            if copy.packet is None and copy.wire:
+                self._port.write_altered(copy.wire)
+            elif copy.packet is not None and not (in_time and copy is first):
+                self._stale.add(tick, copy)
+        if first is not None and first.packet is not None and in_time:
+            self._timer_runs = True
+            self._port.write(*self._stale.due(t_ns, tick), first.packet)
+        elif self._lockstep or not self._timer_runs:
+            self._port.send(Tick(tick))
+        return in_time
+
+    def _record(
+        self, tick: int, direction: Direction, packet: bytes, copy: Copy, in_time: bool = True, why_late: str = ""
+    ) -> None:
+        fate = copy.fate
+        outcome, cause = copy.outcome(in_time), copy.cause(in_time, why_late)
+        self._recorder.packet(tick, direction, outcome, packet, cause, copy.number, fate.arrival_ns, copy.wire)
 
     @staticmethod
     def _valid_mask(sample: Sample) -> int:
@@ -199,6 +226,7 @@ class Answers:
     def _restarted(self) -> None:
         """What the board had not answered is lost with its memory. What it had answered still acts."""
         self._lost(self._tick)
+        self._stale.forget()
         self._early.clear()
         self._should_use.clear()
         self._rejoin.restarted(max(self._tick, 0))
@@ -208,6 +236,7 @@ class Answers:
         if self._followers:
             self._window.incomplete(self._complete)
         self._complete, self._followers = tick - 1, 0
+        self._stale.forget()
         self._early.clear()
         self._should_use.clear()
         self._rejoin.switch_off(tick)
@@ -242,15 +271,31 @@ class Answers:
         if tick == self._tick:
             self.last_answer_ns = now_ns - self._sent_wall_ns
             self.answer_ns.append(self.last_answer_ns)
-        fate = self._fate(packet)
-        if not fate.delivered:
+        self._events = 0
+        copies = self._copies(packet, 0)
+        self._arrived(tick, packet, copies)
+
+    def _arrived(self, tick: int, packet: Packet, copies: Sequence[Copy]) -> None:
+        """COMMAND(tick) as the modelled link delivers it: the first copy that is whole counts."""
+        first = first_of(copies)
+        acts = False
+        if first is None or first.packet is None:
             self._window.lost(tick)
-            self._recorder.packet(tick, Direction.DOWN, Outcome.DROPPED, packet.raw)
-            return
-        x, y, z = command.torque
-        unit = self._torque_Nm
-        in_time = self._window.arrive(tick, (x * unit, y * unit, z * unit), fate.arrival_ns)
-        self._recorder.packet(tick, Direction.DOWN, Outcome.DELIVERED if in_time else Outcome.LATE, packet.raw)
+        else:
+            command = packet.frame if first.packet == packet.raw else frames.unpack(first.packet).frame
+            x, y, z = command.torque
+            unit = self._torque_Nm
+            acts = self._window.arrive(tick, (x * unit, y * unit, z * unit), first.arrival_ns)
+        for copy in copies:
+            in_time = acts if copy is first else self._window.in_time(tick, copy.arrival_ns)
+            why_late = "" if in_time else self._why_late(tick, copy)
+            self._record(tick, Direction.DOWN, packet.raw, copy, in_time, why_late)
+
+    def _why_late(self, tick: int, copy: Copy) -> str:
+        """By the model; or on the clock of this machine, where the model had it in time."""
+        if self._window.in_time(tick, copy.arrival_ns):
+            return "host clock"
+        return copy.fate.slow if self._window.in_time(tick, self._done_ns[tick]) else "execution"
 
     def _follower(self, packet: Packet) -> None:
         """TELEMETRY or EVENT of the answer under way."""
@@ -259,15 +304,18 @@ class Answers:
             return
         self._followers -= 1
         self._advanced_wall_ns = time.monotonic_ns()
-        outcome = Outcome.DELIVERED if self._fate(packet).delivered else Outcome.DROPPED
-        if packet.type == Type.TELEMETRY and outcome is Outcome.DELIVERED:
+        is_event = packet.type == Type.EVENT
+        copies = self._copies(packet, self._events if is_event else 0)
+        self._events += is_event
+        if not is_event and first_of(copies) is not None:
             self.telemetry = packet.frame
-        self._recorder.packet(packet.tick, Direction.DOWN, outcome, packet.raw)
+        for copy in copies:
+            self._record(packet.tick, Direction.DOWN, packet.raw, copy)
 
     def _stray(self, tick: int) -> None:
         """Dropped. A fresh board that is up to four ticks behind steps them and answers (B8): that is no anomaly."""
         self.strays += tick >= self._first
 
-    def _fate(self, packet: Packet) -> Fate:
-        sent_ns = self._done_ns.get(packet.tick, 0)
-        return self._channel.fate(TO_LAB, packet.tick, packet.type, 0, len(packet.raw) + ENCODED_EXTRA, sent_ns)
+    def _copies(self, packet: Packet, number: int) -> list[Copy]:
+        size, sent_ns = len(packet.raw) + ENCODED_EXTRA, self._done_ns.get(packet.tick, 0)
+        return copies_of(packet.raw, self._channel.fates(TO_LAB, packet.tick, packet.type, number, size, sent_ns))

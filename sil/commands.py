@@ -90,7 +90,7 @@ class CommandWindow:
 
         In time by the model, yet after its tick was decided, is a real miss: the run is no longer reproducible.
         """
-        in_time = self._delay == 0 or arrival_ns < (tick + self._delay) * self._period_ns
+        in_time = self.in_time(tick, arrival_ns)
         decided = tick <= self._decided or tick in self._unexplained
         self._unexplained.discard(tick)
         if in_time and not decided:
@@ -105,6 +105,10 @@ class CommandWindow:
             self._explained.add(tick)
         self.notices.append((events.COMMAND_LATE, tick, min(late_us, 2**31 - 1)))
         return False
+
+    def in_time(self, tick: int, arrival_ns: int) -> bool:
+        """By the model alone."""
+        return self._delay == 0 or arrival_ns < (tick + self._delay) * self._period_ns
 
     def unanswered(self, tick: int) -> None:
         """The run ended, and COMMAND(tick), due after its end, is not here: the clock's fault, or it would be."""

@@ -51,7 +51,7 @@ def measure(run: Run) -> dict[str, Any]:
     settings = run.scenario.get("metrics") or {}
     first = int(settings.get("from_tick") or 0)
     rows = run.tick >= first
-    error = run.error_deg[rows]
+    error = run.error_deg[rows & _reference_began(run)]
     if not np.isfinite(run.reference_deg).any():
         error = run.setpoint_error_deg[rows]  # no reference model in this run: the set-point is the reference
     torque, dwell = run.applied_Nm[rows], dwell_ticks(run)
@@ -69,6 +69,12 @@ def measure(run: Run) -> dict[str, Any]:
         MISMATCH: reference_mismatch_deg(run),
         **_counts(run),
     }
+
+
+def _reference_began(run: Run) -> Array:
+    """(N,) from the first tick with a reference on: where the first SAMPLEs were lost, there is none yet."""
+    began: Array = np.maximum.accumulate(np.isfinite(run.reference_deg).all(axis=1))
+    return began
 
 
 def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | None:

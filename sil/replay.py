@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from protocol import events, frames
+from protocol.codec import StreamDecoder
 from protocol.frames import Command, Config, Event, Tick, Type
 from protocol.law_tables import COMMON, ROW_WORDS, dequantise
 from protocol.links import LinkError
@@ -32,8 +33,10 @@ from sil.session import Session
 from sil.trouble import LinkFailure, UsageError
 
 DELIVERED = "delivered"
+ARRIVED = (DELIVERED, "late", "in_flight")
 ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
 LOOK_EVERY_S = 0.25
+MOST_EVENTS = 16  # that one answer can carry
 TYPE_AT = 1  # of a packet
 
 
@@ -98,7 +101,8 @@ def recorded_scenario(run: Run, sets: Iterable[str] = (), board: str = "process"
         raise UsageError(f"{run.path}: no COMMAND in this log: the board never answered, there is nothing to replay")
     law_file = run.summary.get("law_file") or ""
     directory = Path(law_file).parent if law_file else Path()
-    values = {**run.scenario, "clock": "lockstep", "link": "pty", "board": board}
+    link = {**run.scenario.get("link", {}), "url": "udp"}  # the one that every fault fits; no link is opened by it
+    values = {**run.scenario, "clock": "lockstep", "link": link, "board": board}
     return load_values(values, tuple(sets), where=str(run.path), directory=directory)
 
 
@@ -119,7 +123,7 @@ class RecordedTick(NamedTuple):
     tick: int
     sample: bytes | None
     used: bool  # the board stepped on the SAMPLE
-    stale: tuple[int, ...]  # ticks of SAMPLEs that came since the last step, too late for their own
+    stale: tuple[int, ...]  # ticks of SAMPLEs that came since the last step, too late for their own, or once more
     answer: tuple[bytes, ...]
     open_end: bool  # the run, or the board's memory, ended before the answer: none is expected
     cut_off: bool  # it ended within the answer: only what came is compared
@@ -144,8 +148,9 @@ def _sessions(run: Run) -> Iterator[RecordedSession]:
         config = tuple(row.packet for row in rows if row.type == Type.CONFIG)
         answered = max((row.tick for row in rows if _is_answer(row)), default=-1)
         open_end = not last or unfinished or any(tick >= max(start, answered) for tick in restarts)
+        due = StaleByModel(run.period_ns)
         ticks = tuple(
-            _recorded(tick, list(group), open_end and tick > answered, open_end and tick == answered)
+            _recorded(tick, list(group), due, open_end and tick > answered, open_end and tick == answered)
             for tick, group in groupby(rows, key=lambda row: row.tick)
         )
         yield RecordedSession(config, tuple(tick for tick in ticks if tick.sample is not None))
@@ -155,15 +160,50 @@ def _is_answer(row: PacketRow) -> bool:
     return row.direction == "down" and row.type in ANSWERS
 
 
-def _recorded(tick: int, rows: list[PacketRow], open_end: bool, last: bool) -> RecordedTick:
-    sample = next((row for row in rows if row.type == Type.SAMPLE), None)
-    answer = tuple(row.packet for row in rows if _is_answer(row))
+class StaleByModel:
+    """Which SAMPLEs a session's board got too late, or twice, and when: rule L17 of protocol/SPEC.md, from the log."""
+
+    def __init__(self, period_ns: int) -> None:
+        self._period_ns = period_ns
+        self._waiting: list[tuple[int, int, int]] = []  # arrival, tick, copy
+
+    def before(self, tick: int, samples: list[PacketRow]) -> tuple[int, ...]:
+        """The ticks of those that came right before SAMPLE(tick), in order."""
+        whole = sorted((row.arrival_ns, tick, row.copy) for row in samples if row.fate in ARRIVED)
+        due: list[tuple[int, int, int]] = []
+        if any(row.fate == DELIVERED for row in samples):
+            due = sorted(each for each in self._waiting if each[0] <= tick * self._period_ns)
+            self._waiting = [each for each in self._waiting if each not in due]
+            del whole[0]  # the copy that came first was in time
+        self._waiting += whole
+        return tuple(stale for _, stale, _ in due)
+
+
+def _recorded(tick: int, rows: list[PacketRow], due: StaleByModel, open_end: bool, last: bool) -> RecordedTick:
+    samples = [row for row in rows if row.type == Type.SAMPLE]
+    answer = tuple(row.packet for row in rows if _is_answer(row) and not row.copy)
     ordered = tuple(frames.in_sequence(answer))
-    used = sample is not None and sample.fate == DELIVERED and not _stepped_without(ordered)
+    used = any(row.fate == DELIVERED for row in samples) and not _stepped_without(ordered)
     reported = [_frame(packet) for packet in ordered if packet[TYPE_AT] == Type.EVENT]
-    stale = tuple(event.a for event in reported if event is not None and event.code == events.STALE_SAMPLE)
+    stale, by_model = _stale(reported), due.before(tick, samples)
     cut_off = last and _is_cut_off(ordered)
-    return RecordedTick(tick, sample.packet if sample else None, used, stale, ordered, open_end, cut_off)
+    if cut_off or len(reported) >= MOST_EVENTS:  # they may be more than the answer tells
+        stale = (*by_model, *(each for each in stale if each not in by_model))
+    return RecordedTick(tick, _sent(samples), used, stale, ordered, open_end, cut_off)
+
+
+def _stale(reported: list[Any]) -> tuple[int, ...]:
+    """What the board says of SAMPLEs that it dropped: in its order, by whatever they were late."""
+    return tuple(event.a for event in reported if event is not None and event.code == events.STALE_SAMPLE)
+
+
+def _sent(samples: list[PacketRow]) -> bytes | None:
+    """SAMPLE as the board got it: where altered bytes passed the CRC, what they say."""
+    if not samples:
+        return None
+    first = min((row for row in samples if row.fate == DELIVERED), key=lambda row: row.arrival_ns, default=samples[0])
+    found = StreamDecoder().feed(b"\0" + first.encoded + b"\0") if first.encoded and first.fate == DELIVERED else []
+    return found[0] if found else first.packet
 
 
 def _is_cut_off(answer: tuple[bytes, ...]) -> bool:

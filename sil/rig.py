@@ -11,6 +11,7 @@ import numpy as np
 
 from protocol import frames
 from protocol.channel import Channel, Clear
+from protocol.faulty import Faulty
 from protocol.law_tables import ConfigError, refusal
 from protocol.links import LinkError
 from protocol.outages import Disconnected
@@ -91,22 +92,25 @@ def assemble(
     """Build everything; with a board, the session is open and the board READY. Raises SilError with one line.
 
     log: file for a board process's stderr. wired: somebody else starts the board, whatever the scenario says.
-    channel: what happens to frames on the way; None: the clear channel of `link.baud`. clock: None: the scenario's.
+    channel: what happens to frames on the way; None: what section `link` says. clock: None: the scenario's.
     """
     try:
         clock = clock or new_clock(scenario.clock.mode, scenario.period_ns, scenario.clock.spin_us)
         if scenario.board == "none":
             return Rig(_loop(scenario, clock, Nobody(), _scheduled(scenario), recorder, None), clock)
-        return _with_board(scenario, clock, recorder, log, notify, wired, _channel(scenario, channel))
+        return _with_board(scenario, clock, recorder, log, notify, wired, channel_of(scenario, channel))
     except LinkError as error:
         raise LinkFailure(str(error)) from None
 
 
-def _channel(scenario: Scenario, good: Channel | None) -> Channel:
-    """The modelled wire of the scenario (or the one that was handed over), with the outages of its events."""
+def channel_of(scenario: Scenario, wire: Channel | None = None) -> Channel:
+    """The modelled link: clear or with faults, or the one that is handed over; with the outages of the scenario."""
+    if wire is None:
+        faults = scenario.link.faults.any
+        models = scenario.link.models()
+        wire = Faulty(scenario.seed, scenario.period_ns, *models) if faults else Clear(scenario.link.baud)
     outages = timeline.outages(scenario.events, scenario.period_us, scenario.ticks)
-    good = good or Clear(scenario.link.baud)
-    return Disconnected(good, outages) if outages else good
+    return Disconnected(wire, outages) if outages else wire
 
 
 def law_orders(scenario: Scenario) -> Orders:
@@ -187,6 +191,7 @@ def _answers(scenario: Scenario, rig: Rig, recorder: Recorder, channel: Channel)
         rig.window,
         recorder,
         2.0 ** -common["torque_bits"],
+        common["sample_timeout_us"] * 1000,
         lockstep=not rig.clock.paced,
         check_alive=rig.host.check_alive,
         dead_after_s=DEAD_AFTER_S,

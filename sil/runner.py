@@ -16,6 +16,7 @@ from protocol import events, frames
 from protocol.links import LinkError
 from sil import lateness
 from sil.checks import check
+from sil.link_counts import fates
 from sil.metrics import Judgement, as_json, judge, measure
 from sil.plain import plain
 from sil.realtime import Granted, granted, refuse_impossible, suspended_ns
@@ -278,6 +279,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "not_a_number": not_a_number,
         "restarted_at_ticks": [event.tick for event in run.events if event.code == events.BOARD_RESTARTED],
         "link": link,
+        "fates": fates(report.fates),
         "timing": timing,
         "reproducible": not link["real_misses"] and not link["restarts"],
         "sha256": report.sha256,

@@ -69,6 +69,9 @@ class PacketRow(NamedTuple):
     fate: str  # delivered, late, dropped, corrupted, in_flight
     packet: bytes  # header to CRC
     encoded: bytes  # bytes on the wire where a byte fault altered them, else empty
+    cause: str = ""  # why it was lost, altered or late: drop, burst, bit errors, ...; empty for logs of older versions
+    copy: int = 0  # 0: the frame's own, 1: of a duplicate
+    arrival_ns: int = -1  # modelled, on the simulation's clock, had it not been lost; -1: not modelled
 
 
 class Run:
@@ -208,9 +211,9 @@ class Run:
         with readable(self.path):
             for direction in ("up", "down"):
                 for message in content.messages[f"/packet/{direction}"]:
-                    _, sequence, type_, fate, packet, encoded = layouts.PACKET.unpack(message[1])
-                    tick = message[0] // self.period_ns
-                    rows.append(PacketRow(tick, direction, type_, sequence, Fate(fate).name.lower(), packet, encoded))
+                    _, sequence, type_, fate, packet, encoded, cause, copy, at_ns = layouts.PACKET.unpack(message[1])
+                    tick, named = message[0] // self.period_ns, Fate(fate).name.lower()
+                    rows.append(PacketRow(tick, direction, type_, sequence, named, packet, encoded, cause, copy, at_ns))
         return sorted(rows, key=lambda row: row.tick)  # stable: up before down, then as written
 
     @cached_property

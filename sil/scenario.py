@@ -23,6 +23,7 @@ from sil.scenario_events import Event
 from sil.scenario_events import findings as event_findings
 from sil.scenario_faults import findings as fault_findings
 from sil.scenario_instruments import Actuators, Sensors
+from sil.scenario_link import Link, faults_problems
 from sil.scenario_metrics import refused_metric
 from sil.scenario_sections import (
     Attitude,
@@ -30,7 +31,6 @@ from sil.scenario_sections import (
     Clock,
     Guidance,
     Law,
-    Link,
     Metrics,
     Name,
     Plant,
@@ -172,8 +172,10 @@ class Scenario(Section):
         return self.model_dump(mode="json")
 
     def identity(self) -> dict[str, Any]:
-        """resolved() without NOT_IDENTITY: what the numbers of a run depend on."""
-        return {key: value for key, value in self.resolved().items() if key not in NOT_IDENTITY}
+        """resolved() without NOT_IDENTITY: what the numbers of a run depend on. Of the link its faults, if any."""
+        values = self.resolved()
+        faults = {"link": {"faults": values["link"]["faults"]}} if self.link.faults.any else {}
+        return {key: value for key, value in values.items() if key not in NOT_IDENTITY} | faults
 
 
 def load_scenario(
@@ -268,6 +270,7 @@ def _cross_problems(scenario: Scenario) -> Iterator[Problem]:
         _torque_scale,
         _files,
         _events,
+        _link_faults,
     )
     for check in checks:
         yield from check(scenario)
@@ -365,6 +368,13 @@ def _events(scenario: Scenario) -> Iterator[Problem]:
         *fault_findings(scenario.sensors, scenario.actuators, period_us, ticks),
     ):
         yield _problem(scenario, path, expected, got)
+
+
+def _link_faults(scenario: Scenario) -> Iterator[Problem]:
+    url = scenario.board if "://" in scenario.board else scenario.link.url
+    around = (scenario.board, url, scenario.period_s, scenario.duration_s)
+    for path, expected, got in faults_problems(scenario.link.faults, *around):
+        yield _problem(scenario, ("link", "faults", *path), expected, got)
 
 
 def _problem(scenario: Scenario, key: str | Path, expected: str, got: object) -> Problem:

@@ -83,8 +83,22 @@ class Counterpart(Protocol):
 class Recorder(Protocol):
     """Where a run's rows go. Nothing handed over here comes from a wall clock, except what its name says."""
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
-        """A deterministic frame, header to CRC; direction and fate as in sil.sinks.journal."""
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
+        """A copy of a deterministic frame, header to CRC; direction and fate as in sil.sinks.journal.
+
+        cause: why it was lost, altered or late. copy: 0 for the frame's own. arrival_ns: modelled; -1: not modelled.
+        encoded: the bytes on the wire where a byte fault altered them.
+        """
 
     def session(self, tick: int) -> None:
         """A board session starts at this tick; its CONFIG packets follow."""

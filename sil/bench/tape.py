@@ -18,9 +18,19 @@ class Tape:
     def session(self, tick: int) -> None:
         self.rows.append(("session", (tick,)))
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
         self.packets.append(packet)
-        self.rows.append(("packet", (tick, direction, fate, packet)))
+        self.rows.append(("packet", (tick, direction, fate, packet, cause, copy, arrival_ns, encoded)))
 
     def housekeeping(self, direction: int, packet: bytes) -> None:
         self.rows.append(("housekeeping", (direction, packet)))

@@ -36,10 +36,12 @@ HEAVIEST = ("mrac", "appc", "pd")
 class Gaps(Clear):
     """A clear channel that loses some SAMPLEs, always the same."""
 
-    def fate(self, direction: str, tick: int, frame_type: int, copy: int, encoded_len: int, t_ns: int) -> Fate:
+    def fates(
+        self, direction: str, tick: int, frame_type: int, number: int, encoded_len: int, t_ns: int
+    ) -> tuple[Fate, ...]:
         if direction == TO_BOARD and frame_type == Type.SAMPLE and tick % LOST_EVERY >= LOST_EVERY - LOST_IN_A_ROW:
-            return Fate(False, t_ns, "gap")
-        return super().fate(direction, tick, frame_type, copy, encoded_len, t_ns)
+            return (Fate(False, t_ns, "gap"),)
+        return super().fates(direction, tick, frame_type, number, encoded_len, t_ns)
 
 
 def scenario_of(name: str, ticks: int) -> Scenario:

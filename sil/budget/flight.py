@@ -69,8 +69,13 @@ def fly(scenario: Scenario, channel: Channel | None = None) -> Flight:
 
 
 def flight_of(run: Run, scenario: Scenario) -> Flight:
-    """Of a recorded run of one session, in fixed point."""
-    rows = [_Row(row.tick, row.direction == "down", row.fate == "delivered", row.packet) for row in run.packets]
+    """Of a recorded run of one session, in fixed point; stale SAMPLEs and further copies are left out."""
+    delivered = {(row.tick, row.direction, row.packet) for row in run.packets if row.fate == "delivered"}
+    rows = [
+        _Row(row.tick, row.direction == "down", (row.tick, row.direction, row.packet) in delivered, row.packet)
+        for row in run.packets
+        if not row.copy
+    ]
     config = tuple(row.packet for row in rows if row.packet[TYPE_AT] == Type.CONFIG)
     return _flight(scenario.law.name, config, [row for row in rows if row.packet[TYPE_AT] != Type.CONFIG])
 
@@ -81,7 +86,17 @@ class _Kept(Nothing):
 
     rows: list[_Row] = field(default_factory=list)
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
         self.rows.append(_Row(tick, direction == Direction.DOWN, fate == Fate.DELIVERED, packet))
 
 

@@ -191,7 +191,8 @@ def config_difference(a: Run, b: Run) -> list[tuple[str, Any, Any]]:
 def _counted(row: PacketRow, config_parts: int) -> tuple[Any, ...]:
     """A frame to compare: its number is counted from the end of CONFIG, whose parts may be more in one of the runs."""
     sequence = (row.sequence - config_parts) & 0xFFFF if row.direction == "up" else row.sequence
-    return row.tick, row.direction, row.type, sequence, row.fate, row.packet[:2], row.packet[4:-4], row.encoded
+    what = row.fate, row.cause, row.packet[:2], row.packet[4:-4], row.encoded
+    return row.tick, row.direction, row.type, sequence, row.copy, *what
 
 
 def _place(row: PacketRow) -> tuple[int, bool, int]:
@@ -204,7 +205,10 @@ def _compared(
     row = x or y
     assert row is not None
     pairs = zip((x, y), laws, strict=True)
-    a, b = ({} if r is None else {**fields_of(r.packet, law), "fate": r.fate} for r, law in pairs)
+    a, b = (
+        {} if r is None else {**fields_of(r.packet, law), "fate": r.fate, "cause": r.cause, "copy": r.copy}
+        for r, law in pairs
+    )
     if x is not None and y is not None and x.encoded != y.encoded:
         a["encoded"], b["encoded"] = x.encoded.hex(), y.encoded.hex()
     names = dict.fromkeys([*a, *b])

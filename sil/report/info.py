@@ -68,18 +68,20 @@ def text(content: Mapping[str, Any]) -> str:
     lines += [_row("sha256", content["sha256"]), "", _heading("roll", "pitch", "yaw")]
     lines += [_metric(name, value) for name, value in _named(content["metrics"]).items()]
     lines += _block("requirements", [_required(line) for line in content["require"]])
-    lines += _block("frames", [f"{key:<24}{count:>8}" for key, count in content["packets"].items()])
+    lines += _block("frames", [f"{key:<48}{count:>8}" for key, count in content["packets"].items()])
     lines += _block("events", [_event_line(name, entry) for name, entry in content["events"].items()])
     lines += _block("host", [f"{key:<24}{_short(value)}" for key, value in content["host"].items()])
     return "\n".join(lines)
 
 
 def _packets(run: Run) -> dict[str, int]:
-    """Frames by direction, type and, where it is not `delivered`, fate."""
+    """Frames by direction, type and, where it is not `delivered`, fate; by cause where the link did something."""
     counts: Counter[str] = Counter()
     for packet in run.packets:
         fate = "" if packet.fate == "delivered" else f" {packet.fate}"
-        counts[f"{packet.direction} {_TYPES.get(packet.type, hex(packet.type))}{fate}"] += 1
+        said = f" ({packet.cause})" if packet.cause else ""
+        copy = ", a further copy" if packet.copy else ""
+        counts[f"{packet.direction} {_TYPES.get(packet.type, hex(packet.type))}{fate}{said}{copy}"] += 1
     return dict(sorted(counts.items()))
 
 

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from sil.link_counts import sentence
 from sil.screen import NORMAL, QUIET, VERBOSE, requirement_text
 from sil.screen.palette import AXES, BAD, DIM, GOOD, TITLE, WARN
 
@@ -72,6 +73,9 @@ def _link(summary: Mapping[str, Any]) -> Iterator[str]:
     link = {name: count for name, count in summary["link"].items() if count or name in ALWAYS_SHOWN}
     if summary["board"] != "none":
         yield "link: " + ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in link.items())
+    for way, counts in (summary.get("fates") or {}).items():
+        if told := sentence(way, counts):
+            yield f"link {told}"
     if not summary["reproducible"]:
         yield f"[{WARN}]not reproducible[/]: {'; '.join(_not_reproducible(summary))}"
 

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 MAGIC = b"SILJRNL\n"
-VERSION = 2  # 1, still read, had no causes of lateness
+VERSION = 3  # 1 and 2, still read: without causes of lateness (1); packets without cause, copy and arrival (1, 2)
 PAYLOAD_LIMIT = 16 * 2**20  # bytes; more is taken for a damaged length
 READ_BLOCK = 2**20
 NO_ANSWER = -1  # TIMING.answer_ns where no answer came
@@ -34,7 +34,9 @@ _TRUTH = struct.Struct("<16d3iB")
 _LAB_EVENT = struct.Struct("<Hii")
 _TIMING, _TIMING_1 = struct.Struct("<qqqqqI"), struct.Struct("<qqI")
 _HOUSEKEEPING = struct.Struct("<Bq")
-_PACKET = struct.Struct("<BBH")
+_PACKET, _PACKET_2 = struct.Struct("<BBBBqH"), struct.Struct("<BBH")
+_SAYS_MORE = 0x80  # in a PACKET's direction: the layout since version 3
+NOT_MODELLED = -1  # PACKET.arrival_ns of a frame that the model exempts
 
 
 class Kind(IntEnum):
@@ -82,12 +84,15 @@ class Truth(NamedTuple):
 
 
 class PacketRecord(NamedTuple):
-    """One PACKET record; `encoded` holds the bytes on the wire where a byte fault altered them, else it is empty."""
+    """One PACKET record: a copy of a frame, what became of it and why."""
 
     direction: int
     fate: int
     packet: bytes  # header to CRC
-    encoded: bytes
+    encoded: bytes  # the bytes on the wire where a byte fault altered them, else empty
+    cause: str = ""  # of loss, damage or lateness
+    copy: int = 0  # 0: the frame's own, 1: of a duplicate
+    arrival_ns: int = NOT_MODELLED  # modelled, had it not been lost
 
 
 class Record(NamedTuple):
@@ -119,16 +124,33 @@ def read_truth(payload: bytes) -> Truth:
     return Truth(v[0:4], v[4:7], v[7:10], v[10:13], v[13:16], v[16:19], v[19])
 
 
-def packet_payload(direction: int, fate: int, packet: bytes, encoded: bytes = b"") -> bytes:
-    """PACKET: direction u8, fate u8, packet length u16, packet, encoded (where a byte fault altered it)."""
-    return _PACKET.pack(direction, fate, len(packet)) + packet + encoded
+def packet_payload(
+    direction: int,
+    fate: int,
+    packet: bytes,
+    encoded: bytes = b"",
+    cause: str = "",
+    copy: int = 0,
+    arrival_ns: int = NOT_MODELLED,
+) -> bytes:
+    """PACKET: direction u8 (and 0x80), fate u8, copy u8, length of the cause u8, arrival i64 ns, packet length u16;
+    cause (ASCII), packet, encoded (where a byte fault altered it)."""
+    said = cause.encode("ascii")
+    head = _PACKET.pack(direction | _SAYS_MORE, fate, copy, len(said), arrival_ns, len(packet))
+    return head + said + packet + encoded
 
 
 def read_packet(payload: bytes) -> PacketRecord:
     """The inverse of packet_payload."""
-    direction, fate, length = _PACKET.unpack_from(payload)
-    start = _PACKET.size
-    return PacketRecord(direction, fate, payload[start : start + length], payload[start + length :])
+    if not payload[0] & _SAYS_MORE:
+        direction, fate, length = _PACKET_2.unpack_from(payload)
+        start = _PACKET_2.size
+        return PacketRecord(direction, fate, payload[start : start + length], payload[start + length :])
+    direction, fate, copy, said, arrival_ns, length = _PACKET.unpack_from(payload)
+    start = _PACKET.size + said
+    cause = payload[_PACKET.size : start].decode("ascii")
+    packet, encoded = payload[start : start + length], payload[start + length :]
+    return PacketRecord(direction & ~_SAYS_MORE, fate, packet, encoded, cause, copy, arrival_ns)
 
 
 def event_payload(code: int, a: int, b: int) -> bytes:
@@ -323,8 +345,8 @@ class JournalReader:
         magic, version = _FILE_HEADER.unpack(header)
         if magic != MAGIC:
             raise JournalError(f"{self.path}: expected a journal (it starts with {MAGIC!r}), got {magic!r}")
-        if version not in (1, VERSION):
-            raise JournalError(f"{self.path}: expected journal version 1 or {VERSION}, got {version}")
+        if not 1 <= version <= VERSION:
+            raise JournalError(f"{self.path}: expected journal version 1 to {VERSION}, got {version}")
 
 
 def read_journal(path: str | os.PathLike[str]) -> JournalReader:

@@ -167,19 +167,43 @@ class PacketLayout:
         b"uint8 fate  # 0 delivered, 1 late, 2 dropped, 3 corrupted, 4 in flight\n"
         b"uint8[] packet  # header to CRC\n"
         b"uint8[] encoded  # bytes on the wire where a byte fault altered them, else empty\n"
+        b"string cause  # why it was lost, altered or late, else empty\n"
+        b"uint8 copy  # 0 the frame's own, 1 of a duplicate\n"
+        b"int64 arrival_ns  # modelled, on the simulation's clock, had it not been lost; -1 not modelled\n"
     )
     _HEAD = struct.Struct("<4sIHBBI")
     _LENGTH = struct.Struct("<I")
+    _ARRIVAL = struct.Struct("<q")
     _PAD = (b"", b"\0\0\0", b"\0\0", b"\0")  # up to a multiple of four, by len % 4
 
-    def pack(self, tick: int, sequence: int, type: int, fate: int, packet: bytes, encoded: bytes) -> bytes:
+    def pack(
+        self,
+        tick: int,
+        sequence: int,
+        type: int,
+        fate: int,
+        packet: bytes,
+        encoded: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+    ) -> bytes:
         """The CDR bytes of one message."""
         head = self._HEAD.pack(CDR_HEADER, tick, sequence, type, fate, len(packet))
-        pad = self._PAD[len(packet) % 4]
-        return head + packet + pad + self._LENGTH.pack(len(encoded)) + encoded
+        said = cause.encode("ascii") + b"\0"
+        parts = (
+            head, packet, self._PAD[len(packet) % 4],
+            self._LENGTH.pack(len(encoded)), encoded, self._PAD[len(encoded) % 4],
+            self._LENGTH.pack(len(said)), said, bytes((copy,)),
+        )  # fmt: skip
+        body = b"".join(parts)
+        return body + bytes(-(len(body) - len(CDR_HEADER)) % 8) + self._ARRIVAL.pack(arrival_ns)
 
-    def unpack(self, data: bytes) -> tuple[int, int, int, int, bytes, bytes]:
-        """(tick, sequence, type, fate, packet, encoded) of the CDR bytes."""
+    def unpack(self, data: bytes) -> tuple[int, int, int, int, bytes, bytes, str, int, int]:
+        """(tick, sequence, type, fate, packet, encoded, cause, copy, arrival_ns) of the CDR bytes.
+
+        A log of an older version ends with `encoded`.
+        """
         _, tick, sequence, type_, fate, length = self._HEAD.unpack_from(data)
         start = self._HEAD.size
         second = start + length + len(self._PAD[length % 4])
@@ -187,7 +211,14 @@ class PacketLayout:
         packet, encoded = data[start : start + length], data[second + 4 : second + 4 + size]
         if len(packet) != length or len(encoded) != size:
             raise ValueError(f"packet message of {len(data)} bytes is cut off")
-        return tick, sequence, type_, fate, packet, encoded
+        third = second + 4 + size
+        if third == len(data):
+            return tick, sequence, type_, fate, packet, encoded, "", 0, -1
+        third += len(self._PAD[size % 4])
+        (said,) = self._LENGTH.unpack_from(data, third)
+        cause, copy = data[third + 4 : third + 4 + said], data[third + 4 + said]
+        (arrival_ns,) = self._ARRIVAL.unpack(data[-self._ARRIVAL.size :])
+        return tick, sequence, type_, fate, packet, encoded, cause[:-1].decode("ascii"), copy, arrival_ns
 
 
 PACKET = PacketLayout()

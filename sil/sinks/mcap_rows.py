@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Mapping
+from itertools import groupby
 from typing import Any
 
 from mcap.writer import Writer
@@ -14,10 +16,11 @@ from protocol.frames import Type
 from sil.sinks import events, layouts, viewer
 from sil.sinks import journal as jn
 from sil.sinks.decoding import DEG_PER_BAM, Decoder
-from sil.sinks.journal import Direction, Kind, PacketRecord, Record
+from sil.sinks.journal import Direction, Fate, Kind, PacketRecord, Record
 
 _DEG = 180.0 / math.pi
 _TYPE_AT, _SEQUENCE_AT, _TICK_AT = 1, slice(2, 4), slice(4, 8)
+_RANK: dict[int, int] = {Fate.DELIVERED: 0, Fate.LATE: 1, Fate.IN_FLIGHT: 2, Fate.CORRUPTED: 3, Fate.DROPPED: 4}
 _FIXED_TOPICS = (
     ("/session", layouts.SESSION),
     ("/packet/up", layouts.PACKET),
@@ -42,6 +45,8 @@ class RunRows:
             self._channels[topic] = writer.register_channel(topic, viewer.ENCODING, schema)
         self._scene_sent = False
         self._sessions = 0
+        self._end_ns: int | None = None  # what arrives then or later is in flight
+        self.fates: Counter[tuple[int, int, str, bool]] = Counter()  # of copies: direction, fate, cause, a further one
         self.messages = 0
         self.undecoded = 0
 
@@ -73,8 +78,8 @@ class RunRows:
             if record.kind == Kind.SESSION:
                 self._add("/session", tick, t_ns, layouts.SESSION.pack(tick, self._sessions))
                 self._sessions += 1
-        for packet in packets:
-            self._packet(tick, t_ns, packet)
+        for _, copies in groupby(map(self._at_the_end, packets), key=_frame_order):
+            self._copies(tick, t_ns, list(copies))
         for record in records:
             if record.kind == Kind.TRUTH:
                 self._truth(tick, t_ns, jn.read_truth(record.payload))
@@ -93,20 +98,43 @@ class RunRows:
             self._add("/scene", tick, t_ns, viewer.scene(t_ns))
             self._scene_sent = True
 
-    def _packet(self, tick: int, t_ns: int, record: PacketRecord) -> None:
-        """The raw packet and, where it can be unpacked, its decoded row."""
-        direction, fate, packet, encoded = record
-        sequence = int.from_bytes(packet[_SEQUENCE_AT], "little")
-        header_tick = int.from_bytes(packet[_TICK_AT], "little")
-        type_ = packet[_TYPE_AT] if len(packet) > _TYPE_AT else 0
-        topic = "/packet/down" if direction == Direction.DOWN else "/packet/up"
-        self._add(topic, sequence, t_ns, layouts.PACKET.pack(header_tick, sequence, type_, fate, packet, encoded))
+    def ends_at(self, end_ns: int) -> None:
+        """The run is over at end_ns; the ticks that follow here are its last ones."""
+        self._end_ns = end_ns
+
+    def _at_the_end(self, record: PacketRecord) -> PacketRecord:
+        """What would have arrived once the run was over is in flight, in time or not."""
+        arrives = record.fate in (Fate.DELIVERED, Fate.LATE)
+        if self._end_ns is None or not arrives or record.arrival_ns < self._end_ns:
+            return record
+        return record._replace(fate=Fate.IN_FLIGHT)
+
+    def _copies(self, tick: int, t_ns: int, copies: list[PacketRecord]) -> None:
+        """All copies of one frame, and its decoded row, where it can be unpacked, with the best of their fates."""
+        for record in copies:
+            self._packet(t_ns, record)
+        best = min((record.fate for record in copies), key=lambda fate: _RANK.get(fate, len(_RANK)))
+        for record in copies:
+            if not record.copy:
+                self._frame(tick, t_ns, record, best)
+
+    def _frame(self, tick: int, t_ns: int, record: PacketRecord, fate: int) -> None:
+        _, type_, sequence = _frame_order(record)
         try:
-            frame = frames.unpack(packet).frame
+            frame = frames.unpack(record.packet).frame
         except frames.BadPacket:
             self.undecoded += 1
             return
         self._decoded(tick, t_ns, type_, fate, sequence, frame)
+
+    def _packet(self, t_ns: int, record: PacketRecord) -> None:
+        direction, fate, packet, encoded, cause, copy, arrival_ns = record
+        _, type_, sequence = _frame_order(record)
+        header_tick = int.from_bytes(packet[_TICK_AT], "little")
+        topic = "/packet/down" if direction == Direction.DOWN else "/packet/up"
+        row = layouts.PACKET.pack(header_tick, sequence, type_, fate, packet, encoded, cause, copy, arrival_ns)
+        self._add(topic, sequence, t_ns, row)
+        self.fates[direction, fate, cause, copy > 0] += 1
 
     def _decoded(self, tick: int, t_ns: int, type_: int, fate: int, sequence: int, frame: Any) -> None:
         if type_ == Type.COMMAND:
@@ -190,11 +218,15 @@ class TimingRows:
             self._writer.add_message(self._channels[topic], t_ns, data, t_ns, tick)
 
 
-def _packet_order(record: PacketRecord) -> tuple[int, int, int, int, bytes, bytes]:
+def _packet_order(record: PacketRecord) -> tuple[int, int, int, int, int, bytes, bytes]:
+    return *_frame_order(record), record.copy, record.fate, record.packet, record.encoded
+
+
+def _frame_order(record: PacketRecord) -> tuple[int, int, int]:
+    """(direction, type, sequence)."""
     packet = record.packet
     type_ = packet[_TYPE_AT] if len(packet) > _TYPE_AT else 0
-    sequence = int.from_bytes(packet[_SEQUENCE_AT], "little")
-    return record.direction, type_, sequence, record.fate, packet, record.encoded
+    return record.direction, type_, int.from_bytes(packet[_SEQUENCE_AT], "little")
 
 
 def _register(writer: Writer, topics: Any, metadata: dict[str, str] | None = None) -> dict[str, int]:

@@ -12,7 +12,17 @@ class Nothing:
     def session(self, tick: int) -> None:
         """Not kept."""
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
         """Not kept."""
 
     def housekeeping(self, direction: int, packet: bytes) -> None:

@@ -36,9 +36,20 @@ class JournalRecorder:
         """A board session started at this tick; its CONFIG packets follow."""
         self._journal.add(Kind.SESSION, tick, journal.json_payload({"tick": tick}))
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
-        self._journal.add(Kind.PACKET, tick, journal.packet_payload(direction, fate, packet))
-        if packet[TYPE_AT] == frames.Type.EVENT and self._on_event is not None:
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
+        payload = journal.packet_payload(direction, fate, packet, encoded, cause, copy, arrival_ns)
+        self._journal.add(Kind.PACKET, tick, payload)
+        if packet[TYPE_AT] == frames.Type.EVENT and not copy and self._on_event is not None:
             event: frames.Event = frames.unpack(packet).frame
             self._on_event(tick, event.code, event.a, event.b, 1)
 

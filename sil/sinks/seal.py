@@ -21,7 +21,7 @@ import json
 import os
 import struct
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -62,6 +62,7 @@ class SealReport(NamedTuple):
     too_late: int  # records journalled more than REORDER_TICKS late: left out, for the log never goes back in time
     messages: int
     wall_s: float
+    fates: Mapping[tuple[int, int, str, bool], int]  # how many copies: direction, fate, cause, whether a further one
 
 
 def seal(run_dir: str | os.PathLike[str]) -> SealReport:
@@ -97,6 +98,7 @@ def seal(run_dir: str | os.PathLike[str]) -> SealReport:
         sealing.too_late,
         sealing.run.messages,
         time.perf_counter() - started,
+        sealing.run.fates,
     )
 
 
@@ -182,6 +184,8 @@ class _Sealing:
             raise SealError(f"{self._reader.path}: the journal ends before its META record: nothing was run")
         if not self._end:
             self._drop_incomplete(waiting)
+        if self._end:  # no modelled delay is as long as REORDER_TICKS: what is in flight at the end is here
+            self.run.ends_at(self._end["ticks"] * self._period_ns)
         for tick in sorted(waiting):
             self._tick(tick, waiting[tick])
         self.run.end(self.end)
@@ -254,7 +258,7 @@ def _is_whole(records: list[Record]) -> bool:
     asked = any(p.direction == Direction.UP and RunRows.is_sample(p.packet) for p in packets)
     if not asked or _lost_its_board(records):
         return True
-    answers = [p.packet for p in packets if p.direction == Direction.DOWN]
+    answers = [p.packet for p in packets if p.direction == Direction.DOWN and not p.copy]
     expected = [RunRows.answer_frames(packet) for packet in answers]
     return any(expected) and len(answers) >= max(expected)
 

@@ -44,7 +44,7 @@ def altered(recorded: Path, folder: Path, change: Change, reason: str = "finishe
     for record in read_journal(recorded / "run.journal"):
         payload: bytes | None = record.payload
         if record.kind == Kind.PACKET:
-            direction, fate, packet, _ = read_packet(record.payload)
+            direction, fate, packet, *_ = read_packet(record.payload)
             changed = change(record.tick, packet)
             payload = None if changed is None else packet_payload(direction, fate, changed)
         if record.kind == Kind.END:

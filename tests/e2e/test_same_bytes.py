@@ -72,7 +72,7 @@ def tampered(recorded, folder, type_, tick, change):
     for record in read_journal(recorded / "run.journal"):
         payload = record.payload
         if record.kind == Kind.PACKET and record.tick == tick:
-            direction, fate, packet, _ = read_packet(payload)
+            direction, fate, packet, *_ = read_packet(payload)
             if packet[1] == type_:
                 opened = frames.unpack(packet)
                 payload = packet_payload(direction, fate, frames.pack(change(opened.frame), opened.sequence))

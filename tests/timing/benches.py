@@ -121,12 +121,14 @@ class Script:
     ) -> None:
         self.lose_up, self.lose_down, self.delay_down_ns = set(lose_up), set(lose_down), delay_down_ns or {}
 
-    def fate(self, direction: str, tick: int, frame_type: int, copy: int, encoded_len: int, t_ns: int) -> Fate:
+    def fates(
+        self, direction: str, tick: int, frame_type: int, number: int, encoded_len: int, t_ns: int
+    ) -> tuple[Fate, ...]:
         if direction == TO_BOARD and frame_type == Type.SAMPLE and tick in self.lose_up:
-            return Fate(False, t_ns, "scripted")
+            return (Fate(False, t_ns, "scripted"),)
         if direction == TO_LAB and frame_type == Type.COMMAND and tick in self.lose_down:
-            return Fate(False, t_ns, "scripted")
-        return Fate(True, t_ns + (self.delay_down_ns.get(tick, 0) if direction == TO_LAB else 0), "")
+            return (Fate(False, t_ns, "scripted"),)
+        return (Fate(True, t_ns + (self.delay_down_ns.get(tick, 0) if direction == TO_LAB else 0)),)
 
 
 class Rows:
@@ -134,14 +136,26 @@ class Rows:
 
     def __init__(self) -> None:
         self.packets: list[tuple[int, int, int, bytes]] = []
+        self.copies: list[tuple[str, int, int]] = []  # cause, copy, arrival of each packet
         self.events: list[tuple[int, int, int, int]] = []
         self.truths: list[tuple[int, tuple[float, ...], int]] = []
         self.commits: list[int] = []
         self.sessions: list[int] = []
         self.kept_house: list[tuple[int, bytes]] = []
 
-    def packet(self, tick: int, direction: int, fate: int, packet: bytes) -> None:
+    def packet(
+        self,
+        tick: int,
+        direction: int,
+        fate: int,
+        packet: bytes,
+        cause: str = "",
+        copy: int = 0,
+        arrival_ns: int = -1,
+        encoded: bytes = b"",
+    ) -> None:
         self.packets.append((tick, direction, fate, packet))
+        self.copies.append((cause, copy, arrival_ns))
 
     def session(self, tick: int) -> None:
         self.sessions.append(tick)

@@ -130,9 +130,10 @@ def test_wire_time_at_the_modelled_baud_counts(lab):
     """A SAMPLE of 65 bytes takes 5.6 ms at 115200 bit/s; a period of 6 ms leaves no time for the answer."""
     from protocol.channel import Clear
 
-    slow = lab(Clear(115200), period_s=0.006, duration_s=0.24, law={"name": "pd"})
+    fine = {"period_s": 0.006, "sample_timeout_s": 0.0059, "duration_s": 0.24, "law": {"name": "pd"}}
+    slow = lab(Clear(115200), **fine)
     slow.run()
-    fast = lab(Clear(None), period_s=0.006, duration_s=0.24, law={"name": "pd"})
+    fast = lab(Clear(None), **fine)
     fast.run()
     assert slow.rig.window.late > 0
     assert fast.rig.window.late == 0

@@ -28,10 +28,17 @@ from sil.trouble import LinkFailure
 TICKS = 40
 
 
-def fly(folder: Path, script, clock=None, limit=5, law="appc", **how):
+FAULTS = {
+    "drop": 0.15, "bit_error_rate": 2e-4, "byte_loss": 2e-4, "duplicate": 0.2, "reorder": 0.1,
+    "jitter": {"max_s": 1.2}, "burst": {"share": 0.1, "mean_ticks": 3},
+}  # fmt: skip
+
+
+def fly(folder: Path, script, clock=None, limit=5, law="appc", faults=None, seed=0, **how):
     """A run of 20 s into `folder`, sealed; the message when the board ended it, else ""."""
     values = {"board": "inproc", "duration_s": TICKS * 0.5, "restart_limit": limit, "law": {"name": law}}
-    scenario = load_values({**values, "sensors": {"attitude": {"noise_deg": 0.02}}})
+    link = {"url": "udp", "faults": faults or {}}
+    scenario = load_values({**values, "seed": seed, "link": link, "sensors": {"attitude": {"noise_deg": 0.02}}})
     folder.mkdir(exist_ok=True)
     recorder = JournalRecorder(Journal(folder / "run.journal"))
     rig = assemble(scenario, recorder, None, lambda line: None, clock=clock)
@@ -74,6 +81,21 @@ def test_a_run_with_restarts_replays_identically(tmp_path, name):
     report = replay(run)
     assert report.first is None
     assert (report.ticks, report.sessions, report.lost) == (compared, len(sessions), TICKS - compared)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("ticks", [(0, 1), (3, 20), (10, 11), (12, 30)], ids=str)
+def test_restarts_on_a_link_with_every_fault_replay_identically(tmp_path, ticks, seed):
+    """A board restarts at the first SAMPLE that it gets of these ticks, be it in time or stale."""
+    first, second = ticks
+    script = {first: [BEFORE], second: [COMMAND if second > 4 else BEFORE]}
+    assert fly(tmp_path, script, faults=FAULTS, seed=seed) == ""
+    run = open_run(tmp_path)
+    assert {row.fate for row in run.packets} >= {"dropped", "late", "corrupted"}
+    report = replay(run)
+    assert report.first is None
+    assert report.sessions == len(run.sessions)
+    assert report.ticks + report.lost == TICKS
 
 
 @pytest.mark.parametrize("law", ["pd", "mrac"])

@@ -150,7 +150,7 @@ def test_a_journal_of_version_1_is_still_read(tmp_path: Path) -> None:
     [
         (b"", "expected a journal, got 0 bytes"),
         (b"\x89MCAP0\r\nxxxx", "it starts with"),
-        (b"SILJRNL\n\x09\0\0\0", "expected journal version 1 or 2, got 9"),
+        (b"SILJRNL\n\x09\0\0\0", "expected journal version 1 to 3, got 9"),
     ],
 )
 def test_foreign_files_are_refused_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
