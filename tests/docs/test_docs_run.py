@@ -25,7 +25,8 @@ from sil.scenarios import list_scenarios
 
 REPO = Path(__file__).resolve().parents[2]
 DOCUMENTS = [REPO / "README.md", REPO / "CHANGELOG.md", *sorted((REPO / "docs").glob("*.md"))]
-PAGES = [f"docs/{name}.md" for name in ("GUIDE", "REALTIME", "STUDIES", "CI", "BOARD", "FAULTS")]  # a user follows
+# What a user follows:
+PAGES = [f"docs/{name}.md" for name in ("GUIDE", "REALTIME", "STUDIES", "CI", "BOARD", "FAULTS", "LINK")]
 FENCE = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXIT = re.compile(r"\s+# exit (\d+)$")
 NAMES = {  # of the fenced blocks a page may have
