@@ -114,10 +114,10 @@ class Answers:
             if copy.packet is None and copy.wire:
                 self._port.write_altered(copy.wire)
             elif copy.packet is not None and not (in_time and copy is first):
-                self._stale.add(tick, copy)
+                self._stale.add(copy.arrival_ns, tick, copy.number, copy.packet)
         if first is not None and first.packet is not None and in_time:
             self._timer_runs = True
-            self._port.write(*self._stale.due(t_ns, tick), first.packet)
+            self._port.write(*(each.packet for each in self._stale.due(t_ns, tick)), first.packet)
         elif self._lockstep or not self._timer_runs:
             self._port.send(Tick(tick))
         return in_time

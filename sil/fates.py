@@ -15,6 +15,7 @@ from sil.sinks.journal import Fate as Outcome
 
 ENCODED_EXTRA = 3  # COBS adds one byte to a packet of up to 254, and a zero stands on either side
 ZERO = b"\0"
+STALE_LIMIT = 256
 HEADER_OF = (1, slice(4, 8))  # type and tick
 
 
@@ -88,24 +89,34 @@ def first_of(copies: Sequence[Copy]) -> Copy | None:
     return min(whole, key=lambda copy: (copy.arrival_ns, copy.number)) if whole else None
 
 
+class Waiting(NamedTuple):
+    """A copy of SAMPLE(tick) under way, in order of arrival, tick and copy."""
+
+    arrival_ns: int
+    tick: int
+    copy: int
+    packet: bytes
+
+
 class Stale:
-    """Copies of SAMPLEs on their way that no tick will be stepped on."""
+    """Copies of SAMPLEs on their way that no tick will be stepped on, at most STALE_LIMIT: one more loses the first."""
 
     def __init__(self) -> None:
-        self._waiting: list[tuple[int, int, int, bytes]] = []  # arrival, tick, copy, packet
+        self._waiting: list[Waiting] = []
 
-    def add(self, tick: int, copy: Copy) -> None:
-        """It arrives whole, at copy.arrival_ns."""
-        assert copy.packet is not None
-        self._waiting.append((copy.arrival_ns, tick, copy.number, copy.packet))
+    def add(self, arrival_ns: int, tick: int, copy: int, packet: bytes) -> None:
+        """It arrives whole, at arrival_ns."""
+        self._waiting.append(Waiting(arrival_ns, tick, copy, packet))
+        if len(self._waiting) > STALE_LIMIT:
+            self._waiting.remove(min(self._waiting))
 
-    def due(self, t_ns: int, tick: int) -> list[bytes]:
+    def due(self, t_ns: int, tick: int) -> list[Waiting]:
         """Those of ticks before `tick` that are there by t_ns, in the order of L17; they are taken off."""
         if not self._waiting:
             return []
-        arrived = sorted(each for each in self._waiting if each[0] <= t_ns and each[1] < tick)
+        arrived = sorted(each for each in self._waiting if each.arrival_ns <= t_ns and each.tick < tick)
         self._waiting = [each for each in self._waiting if each not in arrived]
-        return [packet for _, _, _, packet in arrived]
+        return arrived
 
     def forget(self) -> None:
         """The session is lost."""

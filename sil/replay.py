@@ -26,6 +26,7 @@ from protocol.port import Port
 from sil.boards import BoardOrder, plug_in
 from sil.checks import firmware_flies
 from sil.configure import Orders
+from sil.fates import Stale
 from sil.rig import DEAD_AFTER_S, HELLO_WITHIN_S, law_orders, user_law_spec
 from sil.runs import PacketRow, Run, readable
 from sil.scenario import Scenario, load_values
@@ -148,9 +149,11 @@ def _sessions(run: Run) -> Iterator[RecordedSession]:
         config = tuple(row.packet for row in rows if row.type == Type.CONFIG)
         answered = max((row.tick for row in rows if _is_answer(row)), default=-1)
         open_end = not last or unfinished or any(tick >= max(start, answered) for tick in restarts)
-        due = StaleByModel(run.period_ns)
+        stale = Stale()
         ticks = tuple(
-            _recorded(tick, list(group), due, open_end and tick > answered, open_end and tick == answered)
+            _recorded(
+                tick, list(group), (stale, run.period_ns), open_end and tick > answered, open_end and tick == answered
+            )
             for tick, group in groupby(rows, key=lambda row: row.tick)
         )
         yield RecordedSession(config, tuple(tick for tick in ticks if tick.sample is not None))
@@ -160,32 +163,25 @@ def _is_answer(row: PacketRow) -> bool:
     return row.direction == "down" and row.type in ANSWERS
 
 
-class StaleByModel:
-    """Which SAMPLEs a session's board got too late, or twice, and when: rule L17 of protocol/SPEC.md, from the log."""
-
-    def __init__(self, period_ns: int) -> None:
-        self._period_ns = period_ns
-        self._waiting: list[tuple[int, int, int]] = []  # arrival, tick, copy
-
-    def before(self, tick: int, samples: list[PacketRow]) -> tuple[int, ...]:
-        """The ticks of those that came right before SAMPLE(tick), in order."""
-        whole = sorted((row.arrival_ns, tick, row.copy) for row in samples if row.fate in ARRIVED)
-        due: list[tuple[int, int, int]] = []
-        if any(row.fate == DELIVERED for row in samples):
-            due = sorted(each for each in self._waiting if each[0] <= tick * self._period_ns)
-            self._waiting = [each for each in self._waiting if each not in due]
-            del whole[0]  # the copy that came first was in time
-        self._waiting += whole
-        return tuple(stale for _, stale, _ in due)
+def _due(stale: Stale, tick: int, samples: list[PacketRow], period_ns: int) -> tuple[int, ...]:
+    """The ticks of SAMPLEs that by the model came late, or once more, right before SAMPLE(tick) (SPEC, L17)."""
+    whole = sorted((row.arrival_ns, row.copy) for row in samples if row.fate in ARRIVED)
+    due: tuple[int, ...] = ()
+    if any(row.fate == DELIVERED for row in samples):
+        due = tuple(each.tick for each in stale.due(tick * period_ns, tick))
+        del whole[0]  # the copy that came first was in time
+    for arrival_ns, copy in whole:
+        stale.add(arrival_ns, tick, copy, b"")
+    return due
 
 
-def _recorded(tick: int, rows: list[PacketRow], due: StaleByModel, open_end: bool, last: bool) -> RecordedTick:
+def _recorded(tick: int, rows: list[PacketRow], model: tuple[Stale, int], open_end: bool, last: bool) -> RecordedTick:
     samples = [row for row in rows if row.type == Type.SAMPLE]
     answer = tuple(row.packet for row in rows if _is_answer(row) and not row.copy)
     ordered = tuple(frames.in_sequence(answer))
     used = any(row.fate == DELIVERED for row in samples) and not _stepped_without(ordered)
     reported = [_frame(packet) for packet in ordered if packet[TYPE_AT] == Type.EVENT]
-    stale, by_model = _stale(reported), due.before(tick, samples)
+    stale, by_model = _stale(reported), _due(model[0], tick, samples, model[1])
     cut_off = last and _is_cut_off(ordered)
     if cut_off or len(reported) >= MOST_EVENTS:  # they may be more than the answer tells
         stale = (*by_model, *(each for each in stale if each not in by_model))

@@ -14,6 +14,7 @@ from protocol.channel import TO_BOARD, TO_LAB, Damage, Fate
 from protocol.codec import encode
 from protocol.faulty import Burst, Faults, Faulty, Jitter
 from protocol.frames import FRESH, PROPAGATED, USED, Type
+from sil.fates import STALE_LIMIT
 from sil.sinks.journal import Fate as Outcome
 
 TICKS = 40
@@ -144,6 +145,14 @@ def test_before_the_first_sample_a_paced_board_gets_tick(lost):
     bench, paced = fly(told, clock=StallingClock())
     assert paced.packets == lockstep.packets
     assert bench.rig.window.real_misses == 0
+
+
+def test_samples_that_are_always_late_do_not_pile_up():
+    bench, rows = fly({(TO_BOARD, tick, Type.SAMPLE): arrives(TIMEOUT_NS + 1) for tick in range(300)}, duration_s=151.0)
+    reported = stale(rows)
+    assert [command.used for command in rows.commands()][300:] == [USED, USED]
+    assert reported[0] == (300, 300 - STALE_LIMIT)
+    assert bench.rig.window.missed == 0
 
 
 # -- down --------------------------------------------------------------------------------------------------------------
