@@ -162,14 +162,14 @@ def as_json(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def reference_mismatch_deg(run: Run) -> float | None:
-    """Largest |board's reference - ours| over the ticks with TELEMETRY from the reference's start on.
+    """Largest |board's reference - ours| over the ticks with TELEMETRY in which the board's reference runs.
 
     None: the board reported no reference. NaN: it reported one, and ours could not be made (no CONFIG in the log).
     """
     reported = run.reported("reference")
     if not np.isfinite(reported).any():
         return None
-    difference = np.abs(wrapped_deg(reported - run.reference_deg))
+    difference = np.abs(wrapped_deg(reported - run.reference_deg))[run.reference_runs]
     return float(np.nanmax(difference)) if np.isfinite(difference).any() else math.nan
 
 

@@ -283,6 +283,16 @@ class Run:
             return np.full((len(self), 3), np.nan)
         return np.column_stack([self.telemetry[f"{name}_{axis}"] for axis in AXES])
 
+    @property
+    def reference_runs(self) -> Array:
+        """(N,) bool: False from the first tick of a later board session to the first reading its board could use."""
+        runs = np.ones(len(self), bool)
+        starts = [row.tick for row in self.events if row.code == _REFERENCE_RESTART and row.origin == "board" and row.b]
+        for session in self.sessions[1:]:
+            begins = min((tick for tick in starts if tick >= session), default=np.inf)
+            runs &= (self.tick < session) | (self.tick >= begins)
+        return runs
+
     @cached_property
     def _reference_deg(self) -> Array:
         with readable(self.path):
