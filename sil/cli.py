@@ -21,6 +21,7 @@ from sil.verbs import (
     compare,
     completion,
     doctor,
+    faults,
     ladder,
     pil_report,
     replay,
@@ -74,7 +75,7 @@ def sil(
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.plot, compare.compare, report.export, report.diff),
-    "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, bench.bench),
+    "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, faults.faults, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }
 for _panel, _verbs in VERBS.items():

@@ -61,7 +61,7 @@ def _statistics(name: str, records: Sequence[Record]) -> dict[str, Any]:
     having = [(value, record.point) for record in records if (value := record.metrics.get(name)) is not None]
     if not having:
         return {"count": 0, "never": 0, "median": None, "p95": None, "max": None, "max_at_point": None}
-    median, p95 = _percentiles([value for value, _ in having], (50.0, 95.0))
+    median, p95 = percentiles([value for value, _ in having], (50.0, 95.0))
     largest, point = max(having, key=lambda pair: (pair[0], -pair[1]))
     figures = {"median": median, "p95": p95, "max": largest}
     return {
@@ -72,7 +72,7 @@ def _statistics(name: str, records: Sequence[Record]) -> dict[str, Any]:
     }
 
 
-def _percentiles(values: Sequence[float], percents: Sequence[float]) -> list[float]:
+def percentiles(values: Sequence[float], percents: Sequence[float]) -> list[float]:
     """Between two neighbours in proportion; infinite where the upper one is."""
     array = np.array(values, float)
     if np.isfinite(array).all():

@@ -80,10 +80,16 @@ class Plan:
         )
 
 
-def make_plan(scenario: Scenario, conditions: Conditions, planning: Planning = lambda done, of: None) -> Plan:
+def make_plan(
+    scenario: Scenario,
+    conditions: Conditions,
+    planning: Planning = lambda done, of: None,
+    wanted: Callable[[dict[str, Any]], bool] = lambda cell: True,
+) -> Plan:
     """The plan of a sweep of `scenario` under `conditions`; raises UsageError where it makes no sense.
 
-    planning: told how far it is, (points, of how many); 100,000 points take minutes.
+    planning: told how far it is, (points, of how many); 100,000 points take minutes. wanted: whether a cell of the grid
+    is flown; the others are no points of the plan.
     """
     directory = provenance.directory_of(scenario)
     base = variable_values({**scenario.resolved(), "out": None})
@@ -91,7 +97,8 @@ def make_plan(scenario: Scenario, conditions: Conditions, planning: Planning = l
     made = _Maker(base, Path(directory))
     made.refuse_unknown(axes)
     drawn = [axis for axis in axes if axis.draw is not None]
-    cells = _cells([axis for axis in axes if axis.draw is None], conditions.draws if drawn else 1)
+    grid = _cells([axis for axis in axes if axis.draw is None], conditions.draws if drawn else 1)
+    cells = [cell for cell in grid if wanted(cell)]
     if drawn:
         if conditions.draws is None:
             raise UsageError(f"-n: expected how many draws to make, since {drawn[0].key} is drawn; got nothing")

@@ -10,7 +10,7 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -49,10 +49,20 @@ class SweepWatch:
         """No more points."""
 
 
-def new_sweep(scenario: Scenario, conditions: Conditions, out: Path | None, watch: SweepWatch | None = None) -> Results:
-    """Plan a sweep and write the plan; raises UsageError before anything is written. out: None: sweeps/NAME-NNN."""
-    plan = make_plan(scenario, conditions, (watch or SweepWatch()).planning)
-    directory = new_run_dir(plan.name, out)[0] if out is not None else next_run_dir(Path("sweeps"), plan.name)
+def new_sweep(
+    scenario: Scenario,
+    conditions: Conditions,
+    out: Path | None,
+    watch: SweepWatch | None = None,
+    wanted: Callable[[dict[str, Any]], bool] = lambda cell: True,
+    name: str | None = None,
+) -> Results:
+    """Plan a sweep and write the plan; raises UsageError before anything is written.
+
+    out: None: sweeps/NAME-NNN, NAME the scenario's unless said. wanted: whether a cell of the grid is flown.
+    """
+    plan = make_plan(scenario, conditions, (watch or SweepWatch()).planning, wanted)
+    directory = new_run_dir(plan.name, out)[0] if out is not None else next_run_dir(Path("sweeps"), name or plan.name)
     opened = results.create(directory, plan)
     for point in plan.points:
         if point.refused:

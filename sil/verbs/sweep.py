@@ -210,18 +210,18 @@ def sweep(
                 f"--resume: expected neither scenario nor keys beside it: {resume}/plan.json says them all"
             )
         directory = Path(resume)
-        return _interruptible(lambda: _fly(old_sweep(directory, retry_failed), manner))
+        return interruptible(lambda: _fly(old_sweep(directory, retry_failed), manner))
     if retry_failed or again:
         raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")
     if scenario is None:
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
     varied = [spec.key for spec in conditions.specs]
-    base = _base(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
-    return _interruptible(lambda: _fly(new_sweep(base, conditions, out, _watch(manner)), manner))
+    base = base_of(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
+    return interruptible(lambda: _fly(new_sweep(base, conditions, out, watch_of(manner.as_json, manner.quiet)), manner))
 
 
-def _interruptible(action: Callable[[], int]) -> int:
+def interruptible(action: Callable[[], int]) -> int:
     """Planning ends at SIGTERM as at Ctrl-C, and says so; once points are flown, `fly` knows how to end."""
     from sil.stopping import terminated_like_interrupted
 
@@ -233,13 +233,13 @@ def _interruptible(action: Callable[[], int]) -> int:
         return EXIT_INTERRUPTED
 
 
-def _base(
+def base_of(
     name: str, sets: list[str], varied: list[str], clock: str | None, link: str | None, board: str | None
 ) -> Scenario:
     """The scenario in lockstep, and in process, unless it has no board or somebody said how it is to be reached.
 
-    To vary board or link.url says so too: in process all values would be alike. What the link does to frames is a model,
-    and acts in process as anywhere.
+    To vary board or link.url says so too: in process all values would be alike. What the link does to frames is a
+    model, and acts in process as anywhere.
     """
     own = scenario_from(name, sets, clock=clock, link=link, board=board)
     how = any(key in ("board", "link", "link.url") for key in varied)
@@ -250,11 +250,12 @@ def _base(
     return scenario_from(name, [*before, *sets], clock=clock, link=link, board=board)
 
 
-def _watch(manner: Manner) -> SweepWatch:
+def watch_of(as_json: bool, quiet: bool) -> SweepWatch:
+    """A bar on a terminal, lines elsewhere; nothing with --json or -q."""
     from sil.campaign.progress import Terminal
     from sil.campaign.sweep import SweepWatch
 
-    return SweepWatch() if manner.as_json or manner.quiet else Terminal()
+    return SweepWatch() if as_json or quiet else Terminal()
 
 
 def _fly(opened: Results, manner: Manner) -> int:
@@ -264,7 +265,7 @@ def _fly(opened: Results, manner: Manner) -> int:
     if opened.torn:
         print(f"{opened.torn} damaged lines of results.jsonl: their points are flown again", file=sys.stderr)
     before = {number: opened.records.get(number) for number in manner.again}
-    summary = fly(opened, manner.workers, manner.keep, _watch(manner), manner.again)
+    summary = fly(opened, manner.workers, manner.keep, watch_of(manner.as_json, manner.quiet), manner.again)
     if manner.as_json:
         print_json(summary)
     elif manner.quiet:
