@@ -91,13 +91,11 @@ def page_of(plan: Plan, cells: Sequence[Cell]) -> tuple[Page, list[Panel]]:
     return page, panels
 
 
-def _row_name(row: Row, own: int, period_s: float) -> tuple[str, str]:
-    ticks = f"{row.delay} tick{'s' if row.delay != 1 else ''}"
-    sensor = f"sensor {row.delay * period_s:g} s late\n({ticks})" if row.delay else "sensor on time"
-    if row.transport == own:
-        name = f"sensor + {ticks}" if row.delay else "as it is"
-        return name, f"{sensor}\ntransport delay n = {row.transport}"
-    return f"n = {row.transport}", f"transport delay\n{row.transport} tick{'s' if row.transport != 1 else ''}\n{sensor}"
+def _row_name(row: Row, own: int, period_s: float) -> str:
+    """`sensor 1 tick (0.5 s) late, transport delay n = 1`"""
+    ticks = f"{row.delay} tick{'s' if row.delay != 1 else ''} ({row.delay * period_s:g} s)"
+    sensor = f"sensor {ticks} late" if row.delay else "sensor on time"
+    return f"{sensor}, transport delay n = {row.transport}{' (the scenario)' if row == (own, 0) else ''}"
 
 
 def _place(cell: Cell, losses: Sequence[float], bursts: Sequence[float]) -> Place:

@@ -20,8 +20,10 @@ from matplotlib.ticker import FuncFormatter
 
 from sil.report.look import LIGHT, Look, empty, headed
 
-LEFT_in, RIGHT_in, TOP_in, BOTTOM_in, GAP_X_in, GAP_Y_in = 1.75, 1.35, 1.25, 1.25, 0.25, 0.45
+LEFT_in, RIGHT_in, TOP_in, BOTTOM_in, GAP_X_in, GAP_Y_in = 1.15, 1.35, 1.6, 1.15, 0.25, 0.78
 ROW_in = 1.75
+TITLE_in, ROW_TITLE_in = 0.44, 0.12  # above a panel
+MARGIN_in = 0.35
 FRAME = "#D55E00"
 LOST = "#F2F2F2"  # paper of a place where half the runs or more are lost
 _DARK_BELOW = 0.55  # of the colour scale: text on it is white
@@ -50,12 +52,12 @@ class Panel(NamedTuple):
 
 
 class Page(NamedTuple):
-    """Everything on the page in words. columns: over the columns; rows: left of the rows, two lines each."""
+    """Everything on the page in words. columns: over the columns; rows: over the rows."""
 
     heading: str
     facts: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[str, str], ...]
+    rows: tuple[str, ...]
     x_ticks: tuple[str, ...]
     y_ticks: tuple[str, ...]
     x_label: str
@@ -68,11 +70,15 @@ def heat_maps(page: Page, panels: Sequence[Panel], look: Look = LIGHT) -> Figure
     """The page."""
     height = TOP_in + BOTTOM_in + len(page.rows) * ROW_in + (len(page.rows) - 1) * GAP_Y_in
     figure = empty(height, look)
-    headed(figure, page.heading, page.facts, 0.35 / figure.get_figwidth(), look)
+    headed(figure, page.heading, page.facts, MARGIN_in / figure.get_figwidth(), look)
     norm = _norm([place.value for panel in panels for place in panel.places])
+    flown = [panel for panel in panels if panel.places]
     for panel in panels:
         ax = _axes(figure, page, panel)
+        leftmost = panel.column == min((other.column for other in flown if other.row == panel.row), default=-1)
+        lowest = panel.row == max((other.row for other in flown if other.column == panel.column), default=-1)
         _frame(ax, page, panel, look)
+        _label(ax, page, panel, leftmost, lowest, look)
         for place in panel.places:
             _draw(ax, place, norm, look)
     _scale(figure, page, norm, look)
@@ -97,33 +103,32 @@ def _axes(figure: Figure, page: Page, panel: Panel) -> Axes:
 
 
 def _frame(ax: Axes, page: Page, panel: Panel, look: Look) -> None:
-    """Limits, ticks at the outer panels only, names of the column and of the row."""
-    columns, rows = len(page.x_ticks), len(page.y_ticks)
-    ax.set(xlim=(0, columns), ylim=(0, rows), facecolor=look.paper)
-    ax.tick_params(length=0, labelsize=9.5, colors=look.ink, pad=3)
-    ax.set_xticks([i + 0.5 for i in range(columns)], page.x_ticks)
-    ax.set_yticks([i + 0.5 for i in range(rows)], page.y_ticks if panel.column == 0 else [""] * rows)
+    """Limits, names of the column and of the row."""
+    ax.set(xlim=(0, len(page.x_ticks)), ylim=(0, len(page.y_ticks)), facecolor=look.paper)
     for spine in ax.spines.values():
         spine.set_visible(False)
+    over = {"transform": ax.transAxes, "color": look.ink, "va": "baseline", "clip_on": False}
     if panel.row == 0:
-        ax.set_title(page.columns[panel.column], loc="left", fontsize=12, fontweight="bold", color=look.ink, pad=7)
+        title = page.columns[panel.column]
+        ax.text(0, 1 + TITLE_in / ROW_in, title, fontsize=13, fontweight="bold", **over)  # type: ignore[arg-type]
     if panel.column == 0:
-        name, detail = page.rows[panel.row]
-        ax.set_ylabel(page.y_label, fontsize=9.5, color=look.ink, labelpad=3)
-        x = -(LEFT_in - 0.35) / _width_in(ax)
-        ax.text(x, 1.0, name, transform=ax.transAxes, fontsize=10.5, fontweight="bold", color=look.ink, va="top")
-        ax.text(x, 0.88, detail, transform=ax.transAxes, fontsize=9, color=look.faint, va="top", linespacing=1.35)
-    if panel.row == len(page.rows) - 1:
-        ax.set_xlabel(page.x_label, fontsize=9.5, color=look.ink, labelpad=4)
+        ax.text(0, 1 + ROW_TITLE_in / ROW_in, page.rows[panel.row], fontsize=10, **over)  # type: ignore[arg-type]
+
+
+def _label(ax: Axes, page: Page, panel: Panel, leftmost: bool, lowest: bool, look: Look) -> None:
+    """Ticks, at the outer panels with what they mean; in a panel without places, why it has none."""
+    ax.tick_params(length=0, labelsize=9.5, colors=look.ink, pad=3)
     if not panel.places:
-        ax.set(xticks=[], yticks=[] if panel.column else ax.get_yticks())
+        ax.set(xticks=[], yticks=[])
         ax.text(0.5, 0.5, panel.note, transform=ax.transAxes, fontsize=9.5, color=look.faint, ha="center", va="center")
-
-
-def _width_in(ax: Axes) -> float:
-    figure = ax.get_figure()
-    assert figure is not None
-    return float(ax.get_position().width * figure.get_figwidth())  # type: ignore[union-attr]
+        return
+    rows = len(page.y_ticks)
+    ax.set_xticks([i + 0.5 for i in range(len(page.x_ticks))], page.x_ticks)
+    ax.set_yticks([i + 0.5 for i in range(rows)], page.y_ticks if leftmost else [""] * rows)
+    if leftmost:
+        ax.set_ylabel(page.y_label, fontsize=9.5, color=look.ink, labelpad=3)
+    if lowest:
+        ax.set_xlabel(page.x_label, fontsize=9.5, color=look.ink, labelpad=4)
 
 
 def _draw(ax: Axes, place: Place, norm: LogNorm, look: Look) -> None:
@@ -194,8 +199,8 @@ def _legend(figure: Figure, page: Page, look: Look) -> None:
         Patch(facecolor="#B5A66B", edgecolor=(0.13, 0.13, 0.13, 0.6), hatch="////", lw=0.0, label=hatched),
         Patch(facecolor=LOST, edgecolor=(0.13, 0.13, 0.13, 0.4), hatch="////", lw=0.0, label=blank),
     ]
-    key = figure.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.35 / figure.get_figwidth(), 0.12 / figure.get_figheight()),
-        ncol=3, frameon=False, fontsize=9.5, labelcolor=look.ink, handlelength=1.8, handleheight=1.2, columnspacing=2.0,
+    corner = (MARGIN_in / figure.get_figwidth(), 0.12 / figure.get_figheight())
+    figure.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=corner, ncol=3, frameon=False, fontsize=9.5,
+        labelcolor=look.ink, handlelength=1.8, handleheight=1.2, columnspacing=2.0,
     )  # fmt: skip
-    key.set_in_layout(False)
