@@ -56,7 +56,7 @@ class Scenario(Section):
     about: str = ""
     """One line for `sil scenarios`."""
     seed: Annotated[int, Field(ge=0, lt=2**64)] = 0
-    duration_s: Annotated[float, Field(gt=0)] = 600.0
+    duration_s: Annotated[float, Field(gt=0, le=2.6e11)] = 600.0
     """A whole number of periods."""
     period_s: Annotated[float, Field(ge=0.001, le=60)] = 0.5
     """T_s, a whole number of microseconds."""

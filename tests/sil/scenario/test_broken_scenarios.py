@@ -37,6 +37,7 @@ BROKEN: dict[str, tuple[str, str, int, str, str]] = {
     "truth instead of a number": ("hold_limit: true\n", "hold_limit", 1, "a whole number", "true"),
     "restarts without end": ("restart_limit: 1001\n", "restart_limit", 1, "a number not above 1000", "1001"),
     "number instead of truth": ("law: {}\nexpect_missed: 1\n", "expect_missed", 2, "true or false", "1"),
+    "endless duration": ("duration_s: 1e305\n", "duration_s", 1, "a number in s not above 2.6e+11", "1e+305"),
     "infinite duration": ("duration_s: .inf\n", "duration_s", 1, "a finite number in s", "inf"),
     "key given twice": ("seed: 1\nperiod_s: 0.5\nseed: 2\n", "seed", 3, "each key once", "first in line 1"),
     "number beyond float64 among the angles": (
