@@ -28,7 +28,7 @@ VALIDATOR = Draft7Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 
 # What a schema of one file cannot know: other keys, other files, arithmetic. The loader and `sil check` do.
 BEYOND_A_SCHEMA = {
-    "period of no whole number of us", "duration of no whole number of ticks", "infinite duration", "key given twice",
+    "period of no whole number of us", "duration of no whole number of ticks", "key given twice",
     "broken YAML", "list at the top", "user law without its file", "steps out of order", "impossible inertia",
     "inertia not symmetric",
     "quaternion of norm two", "torque scale too fine", "schedule with a board", "schedule that is not there",
