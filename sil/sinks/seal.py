@@ -79,7 +79,8 @@ def seal(run_dir: str | os.PathLike[str]) -> SealReport:
             sealing = _Sealing(reader, run_file, timing_file)
             sealing.all()
     except OSError as error:
-        raise SealError(f"{folder}: cannot write the log: {error.strerror or error}") from error
+        why = f"cannot write the log: {error.strerror or error}"
+        raise SealError(f"{folder}: {why}; run.journal keeps it, `sil recover` makes it where there is room") from error
     except _UNREADABLE as error:  # every CRC is right
         raise SealError(f"{reader.path}: written by another version, or damaged: {repr(error)[:200]}") from error
     with open(run_path, "rb") as file:
