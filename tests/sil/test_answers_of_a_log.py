@@ -7,6 +7,7 @@ import pytest
 from protocol import frames
 from protocol.frames import Command, Event, Sample, Telemetry, Type
 from sil.budget.flight import _flight, _Row
+from sil.fates import Stale
 from sil.replay import _recorded
 from sil.runs import PacketRow
 
@@ -25,6 +26,7 @@ def test_over_the_end_of_the_numbers(first: int) -> None:
     given = answer(first)
     rows = [PacketRow(TICK, "up", Type.SAMPLE, 5, "delivered", SAMPLE, b"")]
     rows += [PacketRow(TICK, "down", packet[1], 0, "delivered", packet, b"") for packet in reversed(given)]
-    assert _recorded(TICK, rows, open_end=False, last=False).answer == tuple(given)
+    model = Stale(), 500_000_000
+    assert _recorded(TICK, rows, model, open_end=False, last=False).answer == tuple(given)
     kept = [_Row(TICK, False, True, SAMPLE), *(_Row(TICK, True, True, packet) for packet in reversed(given))]
     assert _flight("pd", (), kept).ticks == ((SAMPLE, tuple(given)),)
