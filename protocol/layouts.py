@@ -174,7 +174,7 @@ LAYOUTS = (
         "",
         "the next SAMPLE is answered in time, or why not",
     ),
-    Layout(Type.TICK, True, "lab", (), "", "lockstep only: no valid SAMPLE of this tick survived the link"),
+    Layout(Type.TICK, True, "lab", (), "", "no SAMPLE of this tick survived the link in time (L11)"),
     Layout(
         Type.TIMING,
         True,

@@ -114,7 +114,7 @@ class Ready(NamedTuple):
 
 
 class Tick(NamedTuple):
-    """TICK(k), lockstep only: step tick k without a SAMPLE."""
+    """TICK(k): step tick k without a SAMPLE; in lockstep, and on a clock before the first SAMPLE of a session."""
 
     tick: int
 

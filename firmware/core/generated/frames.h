@@ -29,7 +29,7 @@ enum {
     TYPE_EVENT = 0x05,     /* something happened; its text lives in the lab */
     TYPE_HELLO = 0x81,     /* opens a session, and says that the board has none; frozen for ever */
     TYPE_READY = 0x82,     /* the next SAMPLE is answered in time, or why not */
-    TYPE_TICK = 0x83,      /* lockstep only: no valid SAMPLE of this tick survived the link */
+    TYPE_TICK = 0x83,      /* no SAMPLE of this tick survived the link in time (L11) */
     TYPE_TIMING = 0x84,    /* how the board's host fares; optional, never compared */
     TYPE_STOP = 0x85,      /* ends the session; the board forgets nonce and configuration */
     HOUSEKEEPING = 0x80    /* the bit */
