@@ -115,17 +115,17 @@ static void correct(appc_state *s, const appc_par *par, const law_input *in) {
     }
 }
 
-/* angles and rates: the estimate before this tick. */
-static void adapt(appc_state *s, const appc_par *par, const law_input *in, const int32_t angles[3],
-                  const int32_t rates[3]) {
+/* seen: the reading, or the prediction that stands in for it; angles and rates: the estimate before this tick. */
+static void adapt(appc_state *s, const appc_par *par, const int32_t seen[3], const int32_t angles[3],
+                  const int32_t rates[3], bool may_learn) {
     int32_t response[3];
-    second_differences(in->euler, s->reading, s->reading_before, response);
+    second_differences(seen, s->reading, s->reading_before, response);
     inverse(angles, rates, response, response);
     for (int i = 0; i < 3; i++) {
         int64_t both = wide(drive(par, i, s->applied[i])) + drive(par, i, s->applied_before[i]);
         int32_t x = washed(&s->response[3 * i], response[i]);
         int32_t c = washed(&s->drive[3 * i], (int32_t)shift_round(both, 1));
-        if (s->steps >= LEARN_FROM) {
+        if (may_learn && s->steps >= LEARN_FROM) {
             learn(&s->g[i], &s->P[i], x, c);
             s->g_inverse[i] = (int32_t)div_trunc(ONE_Q(56), s->g[i]);
         }
@@ -133,15 +133,13 @@ static void adapt(appc_state *s, const appc_par *par, const law_input *in, const
 }
 
 /* The readings and the torque that acts from now on move up. */
-static void take_inputs(appc_state *s, const appc_par *par, const law_input *in) {
+static void take_inputs(appc_state *s, const appc_par *par, const law_input *in, const int32_t seen[3]) {
     for (int i = 0; i < 3; i++) {
         bool known = in->applied_known != 0;
         s->applied_before[i] = s->applied[i];
         s->applied[i] = known ? sat32(shift_round(in->applied[i], par->torque_shift)) : s->command[i];
-        if (in->fresh != 0) {
-            s->reading_before[i] = s->reading[i];
-            s->reading[i] = in->euler[i];
-        }
+        s->reading_before[i] = s->reading[i];
+        s->reading[i] = seen[i];
     }
 }
 
@@ -203,14 +201,16 @@ static void appc_step(void *memory, const law_input *in, reference *ref, law_out
     if (in->fresh != 0) {
         correct(s, par, in);
     }
-    if (par->adapt != 0) {
-        if (in->fresh != 0 && in->good_run >= smaller(3, s->steps + 1)) {
-            adapt(s, par, in, angles, rates);
-        } else {
-            out->flags = FLAG_IDENTIFICATION_PAUSED;
-        }
+    int32_t seen[3];
+    for (int i = 0; i < 3; i++) {
+        seen[i] = in->fresh != 0 ? in->euler[i] : s->y[i];
     }
-    take_inputs(s, par, in);
+    if (par->adapt != 0) {
+        bool may_learn = in->fresh != 0 && in->good_run >= smaller(3, s->steps + 1);
+        adapt(s, par, seen, angles, rates, may_learn);
+        out->flags = may_learn ? 0 : FLAG_IDENTIFICATION_PAUSED;
+    }
+    take_inputs(s, par, in, seen);
     if (s->steps < START_STEPS) {
         start(s, ref);
         out->flags += FLAG_STARTING;

@@ -13,7 +13,8 @@ FWD, INV: kinematics.py; Gamma: gyroscopic torque at the same instant, 0 without
     Gamma       gyroscopic.py; h = wheel momentum as reported, without a SAMPLE propagated by -u T_s
 
 Start: four ticks of zero torque while the observer settles; the reference waits at y^ and then leaves from y^ + v^ with
-rate v^, so the first command does not jump. Adaptation begins at tick 25 and rests until three readings in a row came.
+rate v^, so the first command does not jump. Adaptation begins at tick 25. Where a reading is lost y^ stands in for it
+in z and the filters go on, so that the noise in z still cancels; g rests until three readings in a row came.
 Gains: K1 = (1-pc)^2, K2 = (1-pc)(3+pc)/2 (double pole pc); L = 1-po^3, 1.5 (1-po)^2 (1+po), (1-po)^3 (triple pole po).
 Fixed form: y bam; v, w, accelerations turn36; u, h Q28; g Q28, P Q34; the regression in rad Q35.
 Source: study of paper 004, section 3.1 (there: BEST). Transport delay: exactly one sample. Needs Euler angles.
@@ -117,16 +118,16 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         _propagate_float(s, par)
     if fresh:
         _correct_float(s, par, inp)
+    seen = triple(inp, 3) if fresh else triple(s, Y)
     if par[ADAPT] != 0.0:
-        if fresh and inp[1] >= min(3.0, s[STEPS] + 1.0):
-            _adapt_float(s, par, inp, angles, rates)
-        else:
+        learn = fresh and inp[1] >= min(3.0, s[STEPS] + 1.0)
+        if not learn:
             out[3] += 4.0
+        _adapt_float(s, par, seen, angles, rates, learn)
     for i in range(3):
         s[BEFORE + i] = s[APPLIED + i]
         s[APPLIED + i] = inp[13 + i] if inp[2] != 0.0 else s[COMMAND + i]
-        if fresh:
-            s[READING_BEFORE + i], s[READING + i] = s[READING + i], inp[3 + i]
+        s[READING_BEFORE + i], s[READING + i] = s[READING + i], seen[i]
     if s[STEPS] < START_STEPS:
         last = s[STEPS] == START_STEPS - 1
         for i in range(3):
@@ -183,13 +184,13 @@ def _correct_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
 
 
 @jit.callee
-def _adapt_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: Triple, rates: Triple) -> None:
-    z = second_differences_float(triple(inp, 3), triple(s, READING), triple(s, READING_BEFORE))
+def _adapt_float(s: np.ndarray, par: np.ndarray, seen: Triple, angles: Triple, rates: Triple, learn: bool) -> None:
+    z = second_differences_float(seen, triple(s, READING), triple(s, READING_BEFORE))
     response = inverse_float(angles, rates, z)
     for i in range(3):
         x = washed_float(s, RESPONSE, i, response[i])
         c = washed_float(s, DRIVE, i, 0.5 * (s[APPLIED + i] + s[BEFORE + i]) * par[DRIVE_OF + i])
-        if s[STEPS] >= LEARN_FROM:
+        if learn and s[STEPS] >= LEARN_FROM:
             s[G + i], s[P + i] = learn_float(s[G + i], s[P + i], x, c)
 
 
@@ -232,16 +233,16 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         _propagate_fixed(s, par)
     if fresh:
         _correct_fixed(s, par, inp)
+    seen = triple(inp, 3) if fresh else triple(s, Y)
     if par[ADAPT] != 0:
-        if fresh and inp[1] >= min(3, s[STEPS] + 1):
-            _adapt_fixed(s, par, inp, angles, rates)
-        else:
+        learn = fresh and inp[1] >= min(3, s[STEPS] + 1)
+        if not learn:
             out[3] = 4
+        _adapt_fixed(s, par, seen, angles, rates, learn)
     for i in range(3):
         s[BEFORE + i] = s[APPLIED + i]
         s[APPLIED + i] = sat32(shift_round(inp[13 + i], par[TORQUE_SHIFT])) if inp[2] != 0 else s[COMMAND + i]
-        if fresh:
-            s[READING_BEFORE + i], s[READING + i] = s[READING + i], inp[3 + i]
+        s[READING_BEFORE + i], s[READING + i] = s[READING + i], seen[i]
     if s[STEPS] < START_STEPS:
         last = s[STEPS] == START_STEPS - 1
         for i in range(3):
@@ -320,14 +321,16 @@ def _correct_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
 
 
 @jit.callee
-def _adapt_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, angles: IntTriple, rates: IntTriple) -> None:
-    z = second_differences_fixed(triple(inp, 3), triple(s, READING), triple(s, READING_BEFORE))
+def _adapt_fixed(
+    s: np.ndarray, par: np.ndarray, seen: IntTriple, angles: IntTriple, rates: IntTriple, learn: bool
+) -> None:
+    z = second_differences_fixed(seen, triple(s, READING), triple(s, READING_BEFORE))
     response = inverse_fixed(angles, rates, z)
     for i in range(3):
         drive = _drive_fixed(par, i, s[APPLIED + i]) + _drive_fixed(par, i, s[BEFORE + i])
         x = washed_fixed(s, RESPONSE, i, response[i])
         c = washed_fixed(s, DRIVE, i, shift_round(drive, 1))
-        if s[STEPS] >= LEARN_FROM:
+        if learn and s[STEPS] >= LEARN_FROM:
             s[G + i], s[P + i] = learn_fixed(s[G + i], s[P + i], x, c)
             s[G_INV + i] = div_trunc(1 << 56, s[G + i])
 
