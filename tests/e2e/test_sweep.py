@@ -180,7 +180,7 @@ def test_a_sweep_that_is_terminated_while_it_plans_says_so(cli):
 )
 def test_what_is_varied_of_link_and_board_is_not_set_aside(varied, board):
     """In process there is no link: --vary link.url=pty,udp compared two runs of the same."""
-    assert sweep._base("mrac-rs232", [], varied, clock=None, link=None, board=None).board == board
+    assert sweep.base_of("mrac-rs232", [], varied, clock=None, link=None, board=None).board == board
 
 
 def test_requirements_and_refused_points_decide_the_exit_code(cli):
