@@ -211,7 +211,7 @@ def test_ctrl_z_shows_the_cursor_and_fg_the_view(tmp_path: Path) -> None:
         (painter,) = children_of(screen.process.pid)
         os.killpg(screen.process.pid, signal.SIGTSTP)
         screen.read_until(lambda: is_stopped(screen.process.pid) and is_stopped(painter))
-        screen.read_until(lambda: screen.seen.rindex(SHOW_CURSOR) > screen.seen.rindex(HIDE_CURSOR), 5.0)
+        screen.read_until(lambda: screen.seen.rfind(SHOW_CURSOR) > screen.seen.rfind(HIDE_CURSOR), 5.0)
         stopped_at = len(screen.seen)
         os.killpg(screen.process.pid, signal.SIGCONT)
         screen.read_until(lambda: b"wake-up late" in screen.seen[stopped_at:])
