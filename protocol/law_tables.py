@@ -1,4 +1,4 @@
-"""What the words of CONFIG and TELEMETRY mean: one table for all laws and one per (law id, version).
+"""What the words of CONFIG and TELEMETRY mean: one table for all laws and one per (law id, version), in laws/.
 
 CONFIG words = COMMON, then the law's params, then `guidance_rows` rows of four words (tick, x, y, z; set-point in
 2^-32 turn, zero before the first row). TELEMETRY words = TELEMETRY_COMMON, then the law's. All words are int32.
@@ -13,6 +13,22 @@ import zlib
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from protocol import laws
+from protocol.law_words import (
+    AUTOMATIC,
+    AXES,
+    FORM_FIXED,
+    FORM_FLOAT,
+    READ_EULER,
+    REFERENCE_NONE,
+    REFERENCE_PAPER,
+    REFERENCE_ZOH,
+    STALE_REUSE,
+    USER_LAW_ID,
+    LawTable,
+    Variant,
+    vector,
+)
 from protocol.words import (
     INT32_MAX,
     NO_LIMIT,
@@ -27,64 +43,26 @@ from protocol.words import (
     range_text,
 )
 
-# What belongs to a single word is read from here too.
-__all__ = ["INT32_MAX", "NO_LIMIT", "ConfigError", "Word", "dequantise", "lsb_of", "quantise"]
-
-FORM_FIXED, FORM_FLOAT = 0, 1
-REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
-STALE_PROPAGATE, STALE_REUSE = 0, 1
-DESIGN_PRINTED, DESIGN_REPAIRED = 0, 1
-USER_LAW_ID = 0xFFFF
-READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
-AXES = ("x", "y", "z")
-AUTOMATIC = -1.0  # default of a word with fractional bits: as many as the values that use it allow
-
-
-class Variant(NamedTuple):
-    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ."""
-
-    transport_delays: tuple[int, ...]
-    reference_leads: tuple[int, ...]
-    defaults: Mapping[str, float] = {}
-
-
-class LawTable(NamedTuple):
-    """One law, one version. With lead d, r(k) first shows in ym(k + d); the first allowed lead is the default.
-
-    `variants`, if any, is indexed by the value of the word `variant_word`.
-    """
-
-    law_id: int
-    version: int
-    name: str
-    params: tuple[Word, ...]
-    telemetry: tuple[Word, ...]
-    transport_delays: tuple[int, ...]
-    period_s: tuple[float, float]
-    reference_leads: tuple[int, ...]
-    needs: int
-    variant_word: str = ""
-    variants: tuple[Variant, ...] = ()
-    finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
-
-    def variant(self, params: Mapping[str, float]) -> Variant:
-        """The design that these parameter values choose; of a law with one design, that one."""
-        if self.variant_word:
-            return self.variants[int(params[self.variant_word])]
-        return Variant(self.transport_delays, self.reference_leads)
-
-
-def _vector(name: str, unit: str, q: int | str, low: float, high: float, default: Sequence[float], about: str,
-            axes: Sequence[str] = AXES) -> tuple[Word, ...]:  # fmt: skip
-    return tuple(
-        Word(f"{name}_{axis}", unit, q, low, high, value, f"{about}, {axis}")
-        for axis, value in zip(axes, default, strict=True)
-    )
-
-
-def _flag(name: str, default: int, about: str) -> Word:
-    return Word(name, "", 0, 0, 1, default, about, ("off", "on"))
-
+# What belongs to a single word or to the table of one law is read from here too.
+__all__ = [
+    "AUTOMATIC",
+    "AXES",
+    "FORM_FLOAT",
+    "INT32_MAX",
+    "NO_LIMIT",
+    "REFERENCE_NONE",
+    "REFERENCE_PAPER",
+    "REFERENCE_ZOH",
+    "STALE_REUSE",
+    "USER_LAW_ID",
+    "ConfigError",
+    "LawTable",
+    "Variant",
+    "Word",
+    "dequantise",
+    "lsb_of",
+    "quantise",
+]
 
 COMMON: tuple[Word, ...] = (
     Word("law_id", "", 0, 1, USER_LAW_ID, 1, "selects, with law_version, the table of this law"),
@@ -101,7 +79,7 @@ COMMON: tuple[Word, ...] = (
     Word("momentum_bits", "", 0, 8, 30, 28, "LSB of a momentum is 2^-momentum_bits N m s"),
     Word("rate_bits", "", 0, 8, 30, 28, "LSB of a rate is 2^-rate_bits rad/s"),
     Word("readings_mask", "", 0, 0, 7, 1, "readings the law needs: 1 euler, 2 quaternion, 4 rate"),
-    *_vector("torque_limit", "N m", "torque_bits", 0, math.inf, (math.inf,) * 3, "torque limit (2147483647: none)"),
+    *vector("torque_limit", "N m", "torque_bits", 0, math.inf, (math.inf,) * 3, "torque limit (2147483647: none)"),
     Word("reference_kind", "", 0, 0, 2, 1, "reference model", ("none", "zoh", "paper")),
     Word("reference_lead", "tick", 0, 1, 2, 2, "d: the set-point of tick k first shows in the reference of k + d"),
     Word("reference_pole", "", 30, 0, 1, math.exp(-0.075), "p = exp(-wn T_s), double pole of the reference model"),
@@ -115,91 +93,17 @@ COMMON: tuple[Word, ...] = (
 ROW_WORDS = 4  # tick, x, y, z
 
 TELEMETRY_COMMON: tuple[Word, ...] = (
-    *_vector("reference", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "reference ym(k)"),
-    *_vector("reference_rate", "2^-32 turn/sample", 0, -(2**31), INT32_MAX, (0, 0, 0), "its rate at t_k"),
-    *_vector("setpoint", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "set-point r(k)"),
+    *vector("reference", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "reference ym(k)"),
+    *vector("reference_rate", "2^-32 turn/sample", 0, -(2**31), INT32_MAX, (0, 0, 0), "its rate at t_k"),
+    *vector("setpoint", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "set-point r(k)"),
     Word("samples_lost", "", 0, 0, INT32_MAX, 0, "ticks stepped without a usable SAMPLE"),
     Word("overruns", "", 0, 0, INT32_MAX, 0, "SAMPLEs that found the board busy"),
     Word("dropped", "", 0, 0, INT32_MAX, 0, "SAMPLEs for a tick already stepped"),
     Word("saturations", "", 0, 0, INT32_MAX, 0, "ticks with the torque at its limit"),
 )
 
-_INERTIA = (2.13, 3.04, 3.09)
-_INERTIA_WORDS = _vector("inertia_kgm2", "kg m^2", 26, 0.05, 30, _INERTIA, "principal inertia the law believes in")
-
-PD = LawTable(
-    law_id=1,
-    version=1,
-    name="pd",
-    params=(
-        Word("kp_bits", "", 0, 0, 45, AUTOMATIC, "fractional bits of kp"),
-        Word("kd_bits", "", 0, 0, 45, AUTOMATIC, "fractional bits of kd"),
-        *_vector("kp", "N m/rad", "kp_bits", -1e6, 1e6, (2.1087e-3, 3.0096e-3, 3.0591e-3), "attitude gain"),
-        *_vector("kd", "N m s/rad", "kd_bits", -1e6, 1e6, (0.03621, 0.05168, 0.05253), "rate gain"),
-    ),
-    telemetry=_vector("error", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "ym(k) - y(k)"),
-    transport_delays=(0, 1, 2, 3, 4),
-    period_s=(0.005, 10.0),
-    reference_leads=(2, 1),
-    needs=READ_EULER,
-)
-
-_THETA = ("a1", "a2", "b0", "b1", "d")
-MRAC = LawTable(
-    law_id=2,
-    version=1,
-    name="mrac",
-    params=(
-        Word("design", "", 0, 0, 1, DESIGN_REPAIRED, "d = 1 as printed, or d = 2", ("printed", "repaired")),
-        Word("c2_pole", "", 30, 0, 0.999, 0.8, "double pole of the regulation C2 (printed design: 0.001)"),
-        Word("kappa", "", 30, 0, 1, 0.5, "repaired: the cancelled zero lies at -kappa"),
-        Word("forgetting", "", 30, 0.9, 1, 0.998, "forgetting factor lambda of the identification"),
-        Word("trace_max", "", 20, 1, math.inf, 100, "no forgetting while trace F is at or above this"),
-        Word("F0", "", 20, 1e-4, 100, 1, "initial covariance, F0 times the identity"),
-        _flag("decouple", 0, "Euler decoupling along the reference (MID)"),
-        _flag("identify", 1, "recursive least squares on or off"),
-        *_INERTIA_WORDS,
-        *_vector("printed_b0", "rad/(N m)", 30, -1.99, 1.99, (0.307, 0.305, 0.302), "printed design: b0"),
-        *_vector("printed_b1", "rad/(N m)", 30, -1.99, 1.99, (0.0586, 0.0411, 0.0404), "printed design: b1"),
-    ),
-    telemetry=(
-        *(Word(f"{name}_{axis}", "", 28, -8, 8, 0, f"identified {name}, {axis}") for axis in AXES for name in _THETA),
-        *_vector("trace", "", 16, 0, 32768, (5, 5, 5), "trace of the covariance F"),
-    ),
-    transport_delays=(0, 1),
-    period_s=(0.2, 1.0),
-    reference_leads=(2, 1),
-    needs=READ_EULER,
-    variant_word="design",
-    variants=(Variant((0, 1), (1,), {"c2_pole": 0.001}), Variant((1,), (2,))),
-    finite_in_fixed=("trace_max",),  # F is int32 with 20 fractional bits
-)
-
-APPC = LawTable(
-    law_id=3,
-    version=1,
-    name="appc",
-    params=(
-        Word("controller_pole", "", 30, 0, 0.99, 0.7, "double pole of the state feedback"),
-        Word("observer_pole", "", 30, 0, 0.99, 0.7, "triple pole of the observer"),
-        _flag("adapt", 1, "adapt the gain g of each axis"),
-        _flag("gyro", 0, "compensate the gyroscopic torque"),
-        *_INERTIA_WORDS,
-        Word("orbit_rate_radps", "rad/s", 38, 0, 0.007, 1.0830778e-3, "orbital rate w0, used with gyro"),
-    ),
-    telemetry=(
-        *_vector("g", "", 28, 0.6, 1.7, (1, 1, 1), "identified gain: inertia is inertia_kgm2 / g"),
-        *_vector("P", "", 34, 0, 0.1, (0.1, 0.1, 0.1), "variance of g"),
-        *_vector("innovation", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "reading minus prediction"),
-        *_vector("disturbance", "turn/sample^2", 36, -0.03125, 0.03125, (0, 0, 0), "estimated disturbance w"),
-    ),
-    transport_delays=(1,),
-    period_s=(0.2, 1.0),
-    reference_leads=(2,),
-    needs=READ_EULER,
-)
-
-LAWS: dict[tuple[int, int], LawTable] = {(law.law_id, law.version): law for law in (PD, MRAC, APPC)}
+LAWS: dict[tuple[int, int], LawTable] = {(table.law_id, table.version): table for table in laws.tables()}
+C_LAWS = tuple(table for table in LAWS.values() if table.name in laws.IN_C)  # what a board with the C firmware has
 
 
 def law_by_name(name: str) -> LawTable:

@@ -13,7 +13,8 @@ from typing import Literal, NamedTuple
 from protocol import codec, frames
 from protocol.channel import wire_time_ns
 from protocol.config import MAX_WORDS
-from protocol.law_tables import LAWS, TELEMETRY_COMMON, ConfigError, refusal
+from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
+from protocol.laws import IN_C
 from sil import scenario_law as laws
 from sil.boards import FIRMWARE, WITHOUT_TIMER
 from sil.configure import Orders, orders
@@ -84,10 +85,10 @@ def firmware_flies(scenario: Scenario) -> Iterator[Finding]:
     board, url = scenario.board, scenario.link.url
     if board not in FIRMWARE:
         return
-    if laws.is_user_law(scenario.law.name):
-        in_c = ", ".join(sorted({each.name for each in LAWS.values()}))
-        expected = f"{in_c} for board {board}, the laws in C (board process flies yours)"
-        yield _error(scenario, "law.name", expected, shown(scenario.law.name))
+    if (law := scenario.law.name) not in IN_C:
+        others = "flies yours" if laws.is_user_law(law) else "has the others"
+        expected = f"{', '.join(sorted(IN_C))} for board {board}, the laws in C (board process {others})"
+        yield _error(scenario, "law.name", expected, shown(law))
     elif scenario.law.form != "fixed":
         expected = f"fixed for board {board}, the firmware's arithmetic (board process has both)"
         yield _error(scenario, "law.form", expected, scenario.law.form)

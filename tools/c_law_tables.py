@@ -1,4 +1,4 @@
-"""The tables of protocol/law_tables.py in C: indices of CONFIG words, their ranges in counts, what each law allows.
+"""The tables of the C firmware's laws, from protocol/law_tables.py: indices of words, their ranges, what each allows.
 
 Ranges are integers, exactly equivalent to the check in floating point of parse_configuration(): of a word with a fixed
 number of fractional bits the smallest and largest count; of a word whose bits are another word's value, both bounds as
@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from protocol.law_tables import (
+    C_LAWS,
     COMMON,
-    LAWS,
     ROW_WORDS,
     TELEMETRY_COMMON,
     LawTable,
@@ -30,7 +30,7 @@ NO_WORD = 0xFF
 
 def header() -> str:
     """generated/law_tables.h: indices, choices, and the types of the tables."""
-    tables = LAWS.values()
+    tables = C_LAWS
     parts = [
         NOTE,
         "#ifndef CORE_GENERATED_LAW_TABLES_H\n#define CORE_GENERATED_LAW_TABLES_H\n",
@@ -54,7 +54,7 @@ def source() -> str:
     scales = _scales()
     rows = [_range_row(COMMON, COMMON, 0, scales)]
     tables = []
-    for table in LAWS.values():
+    for table in C_LAWS:
         rows.append(_range_row(table.params, (*COMMON, *table.params), len(COMMON), scales, _prefix(table)))
         tables.append(_table_entry(table))
     parts = [
@@ -97,7 +97,7 @@ def _about(word: Word) -> str:
 
 def _choices() -> Iterator[str]:
     seen: set[str] = set()
-    groups = [("COMMON", COMMON), *((_prefix(table), table.params) for table in LAWS.values())]
+    groups = [("COMMON", COMMON), *((_prefix(table), table.params) for table in C_LAWS)]
     for prefix, words in groups:
         for word in words:
             names = [f"{prefix}_{word.name.upper()}_{choice.upper()}" for choice in word.choices]
@@ -110,7 +110,7 @@ def _types() -> str:
     return f"""\
 enum {{
     ROW_WORDS = {ROW_WORDS}, /* of one guidance row: tick, x, y, z */
-    LAW_TABLES_COUNT = {len(LAWS)},
+    LAW_TABLES_COUNT = {len(C_LAWS)},
     NO_WORD = {NO_WORD}
 }};
 
@@ -141,7 +141,7 @@ typedef struct {{
     uint32_t text_crc; /* CRC-32 of its text (SPEC.md, section 9.1), the start of READY's table hash */
     const word_range *ranges;
     int32_t period_us_min, period_us_max;
-    law_variant variants[{max(len(_variants(table)) for table in LAWS.values())}]; /* by the value of variant_word */
+    law_variant variants[{max(len(_variants(table)) for table in C_LAWS)}]; /* by the value of variant_word */
     uint8_t words;
     uint8_t needs;        /* readings */
     uint8_t variant_word; /* law word, NO_WORD: there is one design */
@@ -167,7 +167,7 @@ def _bounds(word: Word) -> tuple[float, float]:
 
 def _scales() -> list[Scale]:
     """The different (bits, bounds) of words whose LSB another word says."""
-    words = [*COMMON, *(word for table in LAWS.values() for word in table.params)]
+    words = [*COMMON, *(word for table in C_LAWS for word in table.params)]
     return list(dict.fromkeys((word.q, *_bounds(word)) for word in words if isinstance(word.q, str)))
 
 
@@ -195,7 +195,7 @@ def _bits_word(name: str) -> int:
     """Index in CONFIG of the word `name`; the same in every law that has it."""
     places = {
         index
-        for table in LAWS.values()
+        for table in C_LAWS
         for index, word in enumerate((*COMMON, *table.params))
         if word.name == name
     }  # fmt: skip

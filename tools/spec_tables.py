@@ -24,7 +24,6 @@ from protocol.events import EVENTS, FIRST_LAB_CODE
 from protocol.law_tables import (
     COMMON,
     LAWS,
-    PD,
     TELEMETRY_COMMON,
     LawTable,
     Word,
@@ -32,6 +31,7 @@ from protocol.law_tables import (
     table_hash,
     table_text,
 )
+from protocol.laws.pd import PD
 from protocol.layouts import CTYPES, HEADER, HEADER_SIZE, LAYOUT_HASH, LAYOUTS, READINGS, Field, size_of
 from tools.frame_json import hex_lines, to_json
 

@@ -50,7 +50,8 @@ from firmware_sim.controllers.kinematics import (
 from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
 from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_fixed, restart_float, wrap_pi
-from protocol.law_tables import APPC, AXES, Configuration
+from protocol.law_tables import AXES, Configuration
+from protocol.laws.appc import APPC
 
 STATE = (
     Field("y", 3, "turn", 32),

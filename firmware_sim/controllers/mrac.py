@@ -45,7 +45,8 @@ from firmware_sim.controllers.rls import identify_fixed, identify_float
 from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import INT32_MAX, clip, div_trunc, keep32, mul_q, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import AHEAD, NEXT, NOW, PAST
-from protocol.law_tables import AXES, DESIGN_PRINTED, MRAC, Configuration
+from protocol.law_tables import AXES, Configuration
+from protocol.laws.mrac import DESIGN_PRINTED, MRAC
 
 STATE = (
     Field("theta", 15, "rad, N m", 28),

@@ -19,7 +19,8 @@ from firmware_sim.controllers.compiled import CompiledLaw, ranges_of, torque_lim
 from firmware_sim.fields import Field, offsets
 from firmware_sim.fixed import clip, div_trunc, keep32, mul_q, norm_shift, sat32, shift_round, wrap32
 from firmware_sim.guidance.reference import NOW, wrap_pi
-from protocol.law_tables import AXES, PD, Configuration
+from protocol.law_tables import AXES, Configuration
+from protocol.laws.pd import PD
 
 STATE = (
     Field("reading", 3, "turn", 32),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import firmware_sim.controllers
+import protocol.laws
 from firmware_sim import jit
 from firmware_sim.checked import CheckedLaw
 from firmware_sim.controllers import LAWS, SUPPORT, LawRefuses, inputs, new_law
@@ -16,6 +17,7 @@ from firmware_sim.controllers.compiled import CompiledLaw
 from firmware_sim.guidance.reference import Reference
 from protocol.frames import MAX_TELEMETRY_WORDS
 from protocol.law_tables import TELEMETRY_COMMON, config_words, law_by_name, parse_configuration, refusal
+from protocol.laws import IN_C
 
 FORMS = ("fixed", "float")
 FOLDER = Path(firmware_sim.controllers.__file__).parent
@@ -72,12 +74,22 @@ def test_every_file_is_registered_or_support() -> None:
     assert files == registered | set(SUPPORT)
 
 
+def test_every_law_has_its_words_under_its_name() -> None:
+    """And every file of words is registered; what the firmware is said to have is among them."""
+    files = {path.stem for path in Path(protocol.laws.__file__).parent.glob("*.py")} - {"__init__"}
+    modules = {spec.partition(":")[0].rpartition(".")[2] for spec in protocol.laws.LAWS.values()}
+    assert files == modules
+    assert set(protocol.laws.LAWS) == set(LAWS) == {table.name for table in protocol.laws.tables()}
+    assert set(IN_C) <= set(LAWS)
+
+
 def test_laws_are_imported_only_when_named() -> None:
     import subprocess
     import sys
 
     code = (
-        "import sys, firmware_sim.controllers; print([m for m in sys.modules if m.endswith(('.appc', '.mrac', '.pd'))])"
+        "import sys; from firmware_sim.controllers import LAWS;"
+        " print([entry for entry in LAWS.values() if entry.split(':')[0] in sys.modules])"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"
 

@@ -10,12 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from protocol.law_tables import (
-    APPC,
     COMMON,
     LAWS,
-    MRAC,
     NO_LIMIT,
-    PD,
     TELEMETRY_COMMON,
     ConfigError,
     LawTable,
@@ -29,6 +26,9 @@ from protocol.law_tables import (
     table_hash,
     user_table,
 )
+from protocol.laws.appc import APPC
+from protocol.laws.mrac import MRAC
+from protocol.laws.pd import PD
 
 TABLES = list(LAWS.values())
 tables = pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)

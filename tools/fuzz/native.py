@@ -12,7 +12,7 @@ from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from protocol.law_tables import LAWS, config_words
+from protocol.law_tables import C_LAWS, config_words
 from sil.pil import library
 from tools.fuzz import BOARD_TESTS, CORPUS, build_folder, with_board_tests
 from tools.fuzz.session import from_steps
@@ -183,7 +183,7 @@ def _sessions() -> Iterator[bytes]:
 def _flights() -> Iterator[bytes]:
     """Each law with its defaults through twelve plausible samples."""
     random = Random(6)
-    for table in LAWS.values():
+    for table in C_LAWS:
         words = config_words(table, {}, [])
         data = bytes([len(words)]) + struct.pack(f"<{len(words)}i", *words)
         for _ in range(12):

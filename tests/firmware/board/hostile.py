@@ -13,7 +13,7 @@ from c_board import Step
 from protocol import frames
 from protocol.codec import encode
 from protocol.frames import LAYOUT_HASH, NO_TICK, Hello, Reading, Sample, Stop, Tick, Type
-from protocol.law_tables import COMMON, FORM_FLOAT, LAWS, config_words
+from protocol.law_tables import C_LAWS, COMMON, FORM_FLOAT, config_words
 from protocol.words import INT32_MAX
 
 INT32 = (-(2**31), INT32_MAX)
@@ -117,7 +117,7 @@ def hostile_pieces(seed: int, count: int) -> list[bytes]:
 
 def any_words(random: Random) -> tuple[int, ...]:
     """CONFIG words of a law; mostly such as it flies with, and never the float form, which a C board does not have."""
-    table = random.choice(list(LAWS.values()))
+    table = random.choice(C_LAWS)
     rows, tick, size = [], 0, 2 ** random.choice((20, 22, 24, 29))
     for _ in range(random.choice((0, 1, 3, 40))):
         tick += random.randrange(1, 30)

@@ -17,12 +17,12 @@ from hypothesis import strategies as st
 from protocol import config, frames
 from protocol.codec import StreamDecoder, encode
 from protocol.frames import LAYOUT_HASH, Hello, Ready
-from protocol.law_tables import COMMON, FORM_FLOAT, LAWS, ROW_WORDS, LawTable, config_words
+from protocol.law_tables import C_LAWS, COMMON, FORM_FLOAT, ROW_WORDS, LawTable, config_words
 from protocol.words import INT32_MAX, Word
 
 REFUSED = Ready(frames.READY_LAW_REFUSES, frames.NO_INDEX, 0)
 HELLO = Hello(1, 0, 0, LAYOUT_HASH, 7, 0, "test")
-TABLES = list(LAWS.values())
+TABLES = C_LAWS
 by_law = pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 
 

@@ -16,7 +16,7 @@ from comparison import Difference, compare, run
 from episodes import Episode, episodes
 
 import firmware_sim
-from firmware_sim.controllers import LAWS
+from protocol.laws import IN_C
 
 HERE = Path(__file__).parent
 EPISODES = 24
@@ -26,24 +26,24 @@ KEEP32 = "        *flag = 1;\n    }\n    return sat32(x);"
 QUOTIENT = "(a < 0) == (b < 0) ? (int64_t)quotient : difference64(0, (int64_t)quotient)"
 # file, what stands there once, what shall stand there, laws in which it has to show
 MUTATIONS = {
-    "shift_round truncates": ("fixed.h", ROUND, "x >> n", LAWS),
-    "a C division for the shift": ("fixed.h", ROUND, f"{ROUND[:-5]} / (int64_t)(UINT64_C(1) << n)", LAWS),
-    "keep32 wraps": ("fixed.h", KEEP32, KEEP32.replace("sat32", "wrap32"), LAWS),
+    "shift_round truncates": ("fixed.h", ROUND, "x >> n", IN_C),
+    "a C division for the shift": ("fixed.h", ROUND, f"{ROUND[:-5]} / (int64_t)(UINT64_C(1) << n)", IN_C),
+    "keep32 wraps": ("fixed.h", KEEP32, KEEP32.replace("sat32", "wrap32"), IN_C),
     "sat32 lets through what is too small": ("fixed.h", "x < INT32_MIN ? INT32_MIN :", "0 ? INT32_MIN :", ("appc",)),
-    "division rounds down": ("fixed.c", QUOTIENT, QUOTIENT.replace("0, ", "n % d == 0 ? 0 : -1, "), LAWS),
+    "division rounds down": ("fixed.c", QUOTIENT, QUOTIENT.replace("0, ", "n % d == 0 ? 0 : -1, "), IN_C),
     "mul_wide forgets the upper half": ("fixed.h", "sum64(high, low >> 32)", "low >> 32", ("mrac",)),
     "one coefficient of the sine is off by one": ("fixed.c", "35791394", "35791395", ("mrac", "appc")),
     "identification one tick early": ("mrac.c", "s->steps >= 3", "s->steps >= 2", ("mrac",)),
     "covariance not mirrored": ("rls.c", "F[5 * m + n] = F[5 * n + m] =", "F[5 * m + n] =", ("mrac",)),
     "a loss forgotten": ("appc.c", "in->good_run >= smaller(3, s->steps + 1)", "1", ("appc",)),
     "the derivative not over the gap": ("pd.c", "div_trunc(change, s->gap)", "change", ("pd",)),
-    "the reference of the other lead": ("reference.c", "s->lead == 2", "s->lead != 2", LAWS),
+    "the reference of the other lead": ("reference.c", "s->lead == 2", "s->lead != 2", IN_C),
 }
 
 
 @pytest.fixture(scope="module")
 def recorded() -> dict[str, list[Episode]]:
-    return {law: list(episodes(law, EPISODES)) for law in LAWS}
+    return {law: list(episodes(law, EPISODES)) for law in IN_C}
 
 
 @pytest.mark.parametrize("name", MUTATIONS)

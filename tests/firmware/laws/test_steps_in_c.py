@@ -11,8 +11,9 @@ import pytest
 from comparison import compare, run
 from episodes import STEPS, Episode, episodes
 
-from firmware_sim.controllers import LAWS, LawRefuses, inputs, new_law
+from firmware_sim.controllers import LawRefuses, inputs, new_law
 from protocol.law_tables import COMMON, config_words, law_by_name, parse_configuration
+from protocol.laws import IN_C
 from sil.pil import library
 
 EPISODES = 500
@@ -29,7 +30,7 @@ def unsaturated(recorded: list[Episode]) -> float:
     return float(np.mean(shares))
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", IN_C)
 def test_every_step_is_pythons(law: str, tmp_path: Path) -> None:
     """And the same from a build that stops at undefined behaviour and at accesses out of bounds."""
     recorded = list(episodes(law, EPISODES))
@@ -43,7 +44,7 @@ def test_every_step_is_pythons(law: str, tmp_path: Path) -> None:
     assert run(c_build.program(tmp_path / "sanitized", c_build.sanitized()), recorded) == traces
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", IN_C)
 def test_episodes_go_through_everything(law: str) -> None:
     """Each flag that the law has appears, losses as well, and each number of its state moves in some step."""
     recorded = [e for e in episodes(law, 60) if e.expected is not None]
@@ -99,7 +100,7 @@ def test_the_library_that_flies_has_the_same_laws(tmp_path: Path) -> None:
     flown = library.load()
     made = c_build.build(tmp_path / "episode.so", [c_build.HERE / "episode.c"], ["-shared", "-fPIC"], laws=False)
     functions = [ctypes.cast(getattr(flown, name), ctypes.c_void_p).value for name in LAWS_UNDER_TEST]
-    for law in LAWS:
+    for law in IN_C:
         recorded, traces = list(episodes(law, 24)), []
         for e in recorded:
             table, trace = law_by_name(law), ctypes.create_string_buffer(STEPS * 2048)

@@ -11,7 +11,7 @@ import pytest
 from comparison import compare, run
 from episodes import STEPS, episodes
 
-from firmware_sim.controllers import LAWS
+from protocol.laws import IN_C
 
 EPISODES = 500
 MISSING = [name for name in ("unicorn", "elftools", "ziglang") if importlib.util.find_spec(name) is None]
@@ -19,7 +19,7 @@ HERE_IT_MAY_BE_MISSING = bool(MISSING) and "CI" not in os.environ
 pytestmark = pytest.mark.skipif(HERE_IT_MAY_BE_MISSING, reason=f"needs the extras pil and dev: {MISSING}")
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", IN_C)
 def test_every_step_has_the_same_bytes(law: str, tmp_path: Path) -> None:
     from cortex_m4 import CortexM4
 

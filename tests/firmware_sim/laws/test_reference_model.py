@@ -10,7 +10,10 @@ import pytest
 from firmware_sim.checked import rebound
 from firmware_sim.controllers import inputs
 from firmware_sim.guidance import reference as rf
-from protocol.law_tables import APPC, MRAC, PD, config_words, parse_configuration
+from protocol.law_tables import config_words, parse_configuration
+from protocol.laws.appc import APPC
+from protocol.laws.mrac import MRAC
+from protocol.laws.pd import PD
 
 DEG = math.pi / 180
 BAM = 2 * math.pi / 2**32

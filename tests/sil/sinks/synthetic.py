@@ -11,7 +11,8 @@ from pathlib import Path
 
 from protocol import config, events, frames
 from protocol.frames import NO_TICK, Command, Event, Reading, Sample, Telemetry
-from protocol.law_tables import PD, config_words
+from protocol.law_tables import config_words
+from protocol.laws.pd import PD
 from sil.sinks import journal as jn
 from sil.sinks.journal import Direction, Fate, Journal, Kind
 

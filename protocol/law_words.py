@@ -1,0 +1,69 @@
+"""What the table of one law is made of: its words, its designs, and the names for the values of common words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from protocol.words import Word
+
+FORM_FIXED, FORM_FLOAT = 0, 1
+REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
+STALE_PROPAGATE, STALE_REUSE = 0, 1
+USER_LAW_ID = 0xFFFF
+READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
+AXES = ("x", "y", "z")
+AUTOMATIC = -1.0  # default of a word with fractional bits: as many as the values that use it allow
+
+
+class Variant(NamedTuple):
+    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ."""
+
+    transport_delays: tuple[int, ...]
+    reference_leads: tuple[int, ...]
+    defaults: Mapping[str, float] = {}
+
+
+class LawTable(NamedTuple):
+    """One law, one version. With lead d, r(k) first shows in ym(k + d); the first allowed lead is the default.
+
+    `variants`, if any, is indexed by the value of the word `variant_word`.
+    """
+
+    law_id: int
+    version: int
+    name: str
+    params: tuple[Word, ...]
+    telemetry: tuple[Word, ...]
+    transport_delays: tuple[int, ...]
+    period_s: tuple[float, float]
+    reference_leads: tuple[int, ...]
+    needs: int
+    variant_word: str = ""
+    variants: tuple[Variant, ...] = ()
+    finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
+
+    def variant(self, params: Mapping[str, float]) -> Variant:
+        """The design that these parameter values choose; of a law with one design, that one."""
+        if self.variant_word:
+            return self.variants[int(params[self.variant_word])]
+        return Variant(self.transport_delays, self.reference_leads)
+
+
+def vector(name: str, unit: str, q: int | str, low: float, high: float, default: Sequence[float], about: str,
+           axes: Sequence[str] = AXES) -> tuple[Word, ...]:  # fmt: skip
+    """The words name_x, name_y, name_z, each with its own default."""
+    return tuple(
+        Word(f"{name}_{axis}", unit, q, low, high, value, f"{about}, {axis}")
+        for axis, value in zip(axes, default, strict=True)
+    )
+
+
+def flag(name: str, default: int, about: str) -> Word:
+    """A word that is off or on."""
+    return Word(name, "", 0, 0, 1, default, about, ("off", "on"))
+
+
+INERTIA_WORDS = vector(
+    "inertia_kgm2", "kg m^2", 26, 0.05, 30, (2.13, 3.04, 3.09), "principal inertia the law believes in"
+)
