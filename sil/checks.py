@@ -307,6 +307,9 @@ def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
     """Largest step through a critically damped reference: peak rate wn * step / e, peak acceleration wn^2 * step."""
     wn, wheels = scenario.guidance.wn_radps, scenario.actuators.wheels
     if scenario.guidance.reference == "none":
+        if scenario.guidance.accel_limit_degps2 is not None:
+            got = f"{scenario.guidance.accel_limit_degps2:g}"
+            yield _warning(scenario, "guidance.accel_limit_degps2", "null, reference none has no such limit", got)
         return
     if wn * scenario.period_s > 0.5:
         expected = f"at most {0.5 / scenario.period_s:g} rad/s, half a radian per sample"

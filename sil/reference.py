@@ -7,12 +7,14 @@ Per axis, angles in rad, rates per sample, r(k) the set-point, d the lead, p = e
     zoh:    ym += vm + a / 2      k1 = (1-p)^2, k2 = (1-p)(3+p)/2   C1 ym = q^-d (1-p)^2 (1 + q^-1)/2 r
     paper:  ym += vm + a          k1 = (1-p)^2, k2 = 1 - p^2        C1 ym = q^-d (1-p)^2 r
     vm += a                       C1 = (1 - p q^-1)^2
+    none:   ym(k) = ym(k-1) + wrap(r(k) - ym(k-1)), the last term within +-rate_limit; without one ym = r
 
 Where it starts (y is the reference the board reported at tick s):
     model start (REFERENCE_RESTART with b = 1): ym = y up to s + d - 1, where with zoh the rate is
         vm0 = 2 ((1-p)/(1+p))^2 (r - y), as after r(s-1) = r(s), and 0 with paper; r(s) acts from there on;
     bumpless start by the law (b = 0): ym = y up to s + d; it goes on from there at the rate the law found, which
-        TELEMETRY first shows at s + d + 1; r(s+1) is the first that acts.
+        TELEMETRY first shows at s + d + 1; r(s+1) is the first that acts;
+    none, with a rate limit: from the first TELEMETRY at or after the start on; without one there is nothing to start.
 Source: study of paper 004, sections 0 and 3.1; protocol/SPEC.md.
 """
 
@@ -30,6 +32,7 @@ from protocol.law_tables import INT32_MAX, REFERENCE_NONE, REFERENCE_ZOH
 Array = npt.NDArray[np.float64]
 TURN = 2.0 * math.pi
 RAD_PER_BAM = TURN / 2**32
+UNLIMITED = INT32_MAX * RAD_PER_BAM  # rad per sample
 
 
 class Model(NamedTuple):
@@ -61,7 +64,7 @@ def model_of(words: Mapping[str, int]) -> Model:
         words["reference_kind"],
         words["reference_lead"],
         words["reference_pole"] * 2.0**-30,
-        (words["rate_limit"] or INT32_MAX) * RAD_PER_BAM,
+        words["rate_limit"] * RAD_PER_BAM or UNLIMITED,
         (words["accel_limit"] or INT32_MAX) * RAD_PER_BAM,
     )
 
@@ -81,7 +84,7 @@ def recompute(model: Model, setpoint: Array, reported: Array, rate: Array, start
     taken for one in mid-run.
     """
     result = np.full_like(setpoint, np.nan)
-    if model.kind == REFERENCE_NONE:
+    if model.kind == REFERENCE_NONE and model.rate_limit >= UNLIMITED:
         return setpoint.copy()
     seen = np.flatnonzero(np.isfinite(reported).all(axis=1))
     if not seen.size:
@@ -90,9 +93,23 @@ def recompute(model: Model, setpoint: Array, reported: Array, rate: Array, start
     for number, start in enumerate(begins):
         stop = begins[number + 1].row if number + 1 < len(begins) else len(setpoint)
         later = seen[(seen >= start.row) & (seen < stop)]
-        if later.size:
+        if not later.size:
+            continue
+        if model.kind == REFERENCE_NONE:
+            _follow(model.rate_limit, setpoint, reported, int(later[0]), stop, result)
+        else:
             _segment(model, setpoint, reported, rate, start, int(later[0]), stop, result)
     return result
+
+
+def _follow(limit: float, setpoint: Array, reported: Array, seed: int, stop: int, result: Array) -> None:
+    """Fill result[seed:stop]: the set-point, from what was reported at `seed` on, by no more than `limit` a sample."""
+    result[seed] = reported[seed]
+    for k in range(seed + 1, stop):
+        for axis in range(3):
+            step = _wrap(float(setpoint[k, axis] - result[k - 1, axis]))
+            arrived = abs(step) <= limit
+            result[k, axis] = setpoint[k, axis] if arrived else result[k - 1, axis] + math.copysign(limit, step)
 
 
 def _segment(

@@ -273,10 +273,11 @@ class Guidance(Section):
     hold_deg: Triple = (0.0, 0.0, 0.0)
     """For profile hold."""
     reference: Literal["zoh", "paper", "none"] = "zoh"
-    """D of the reference model C1 ym = q^-d D r: (1-p)^2 (1+q^-1)/2, (1-p)^2, or no reference model."""
+    """D of the reference model C1 ym = q^-d D r: (1-p)^2 (1+q^-1)/2, (1-p)^2; none: the set-point itself."""
     wn_radps: Positive = 0.15
     """Natural frequency of the critically damped reference model, p = exp(-wn T_s)."""
     rate_limit_degps: Positive | None = None
+    """Limit of the reference's rate, per axis; with reference none the set-point turns no faster than this."""
     accel_limit_degps2: Positive | None = None
     setpoint_source: Literal["table", "sample"] = "table"
     """table: the board flies the rows of CONFIG; sample: it takes the set-point from each SAMPLE."""

@@ -6,6 +6,7 @@
 #include "law.h"
 
 #define RATE_LIMIT_48 ONE_Q(46) /* a quarter turn per sample: the largest rate the integers carry */
+#define HALF_TURN_48 ONE_Q(47)  /* limits no step of an angle */
 
 void reference_init(reference *self, const int32_t *common) {
     const int64_t p = common[COMMON_REFERENCE_POLE], one_minus = ONE_Q(30) - p, one_plus = ONE_Q(30) + p;
@@ -23,6 +24,9 @@ void reference_init(reference *self, const int32_t *common) {
     }
     par->accel_max = shift_round(accel != 0 ? accel : INT32_MAX, -16);
     par->rate_max = clip(shift_round(rate != 0 ? rate : INT32_MAX, -16), 0, RATE_LIMIT_48);
+    if (kind == COMMON_REFERENCE_KIND_NONE) {
+        par->rate_max = rate != 0 ? shift_round(rate, -16) : HALF_TURN_48;
+    }
     self->state.lead = common[COMMON_REFERENCE_LEAD];
 }
 
@@ -32,6 +36,29 @@ void reference_restart(reference *self, int i, int32_t position, int32_t rate) {
     s->rate_now[i] = s->rate_next[i] = s->accel[i] = 0;
     s->head[i] = shift_round(position, -16);
     s->head_rate[i] = shift_round(rate, -12);
+}
+
+/* `position` turned towards `goal`, the short way, by no more than `most`; all 2^-48 turn. */
+static int64_t turned(int64_t position, int64_t goal, int64_t most) {
+    return wrap_bits(position + clip(wrap_bits(goal - position, 48), -most, most), 48);
+}
+
+/* The set-point itself, turned by no more than the rate limit per sample. */
+static void follow_axis(reference *self, const law_input *in, int i) {
+    const int64_t most = self->par.rate_max, goal = shift_round(in->setpoint[i], -16);
+    reference_state *s = &self->state;
+    int64_t now = turned(s->head[i], goal, most);
+    int64_t later = turned(now, goal, most);
+    int64_t last = turned(later, goal, most);
+    s->past[i] = s->now[i];
+    s->head[i] = now;
+    s->head_rate[i] = 0;
+    s->now[i] = wrap32(shift_round(now, 16));
+    s->next[i] = wrap32(shift_round(later, 16));
+    s->ahead[i] = wrap32(shift_round(last, 16));
+    s->rate_now[i] = sat32(shift_round(wrap_bits(later - now, 48), 12));
+    s->rate_next[i] = sat32(shift_round(wrap_bits(last - later, 48), 12));
+    s->accel[i] = 0;
 }
 
 static void advance_axis(reference *self, const law_input *in, int i) {
@@ -48,18 +75,12 @@ static void advance_axis(reference *self, const law_input *in, int i) {
     accel = rate_new - rate;
     position += rate + (par->kind == COMMON_REFERENCE_KIND_PAPER ? accel : shift_round(accel, 1));
     position = wrap_bits(position, 48);
-    if (par->kind == COMMON_REFERENCE_KIND_NONE) {
-        position = shift_round(in->setpoint[i], -16);
-        rate = rate_new = accel = 0;
-    }
     s->head[i] = position;
     s->head_rate[i] = rate_new;
     int32_t head = wrap32(shift_round(position, 16));
     s->accel[i] = sat32(shift_round(accel, 12));
     s->past[i] = s->now[i];
-    if (par->kind == COMMON_REFERENCE_KIND_NONE) {
-        s->now[i] = s->next[i] = s->ahead[i] = head;
-    } else if (s->lead == 2) {
+    if (s->lead == 2) {
         s->now[i] = s->next[i];
         s->next[i] = s->ahead[i];
         s->ahead[i] = head;
@@ -91,7 +112,11 @@ bool reference_advance(reference *self, const law_input *in) {
         started = true;
     }
     for (int i = 0; i < 3; i++) {
-        advance_axis(self, in, i);
+        if (par->kind == COMMON_REFERENCE_KIND_NONE) {
+            follow_axis(self, in, i);
+        } else {
+            advance_axis(self, in, i);
+        }
     }
     return started;
 }

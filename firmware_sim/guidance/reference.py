@@ -6,9 +6,12 @@ Critically damped, double pole p = exp(-wn T_s), lead d (r(k) first shows in ym(
     ym(m+1) = ym(m) + vm(m) + half am,  vm(m+1) = vm(m) + am
     zoh:   half = 1/2, k1 = (1-p)^2, k2 = (1-p)(3+p)/2: ym(k+d) = D r / (1 - p q^-1)^2, D = (1-p)^2 (1 + q^-1)/2
     paper: half = 1,   k1 = (1-p)^2, k2 = 1 - p^2:      the same with D = (1-p)^2
-    none:  ym = r(k)
+    none:  no model and no lead: ym(k) = ym(k-1) + wrap(r(k) - ym(k-1)), the last term limited to +-rate_limit if there
+           is one (so ym turns at that rate and stops on r), without one ym = r(k). ym(k+1), ym(k+2) are what follows
+           if r stays, the rates what lies between them. accel_limit limits nothing here
 
-Start at the first reading y: ym up to m is y and, with zoh, r(k-1) = r(k), that is vm(m) = 2 ((1-p)/(1+p))^2 (r - y).
+Start at the first reading y: ym up to m is y and, with zoh, r(k-1) = r(k), that is vm(m) = 2 ((1-p)/(1+p))^2 (r - y);
+with none ym(k-1) is y.
 Units: rad and samples, or bam (positions) and 2^-36 turn (rates, accelerations); the recursion itself runs on 2^-48
 turn so that a slow model does not stick. Positions are modulo one turn.
 Source: study of paper 004, sections 0 and 3.1.
@@ -55,6 +58,7 @@ PAR = (
 KIND, K1, K2, START, ACCEL_MAX, RATE_MAX = offsets(PAR)
 
 RATE_LIMIT_48 = 1 << 46  # a quarter turn per sample: the largest rate the integers carry
+HALF_TURN_48 = 1 << 47  # limits no step of an angle
 
 
 @jit.callee
@@ -99,8 +103,32 @@ def advance_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
         state[STARTED] = 1
         started = True
     for i in range(3):
-        _advance_axis_fixed(state, par, inp, i)
+        if par[KIND] == REFERENCE_NONE:
+            _follow_axis_fixed(state, par[RATE_MAX], shift_round(inp[19 + i], -16), i)
+        else:
+            _advance_axis_fixed(state, par, inp, i)
     return started
+
+
+@jit.callee
+def _turned_fixed(position: int, goal: int, most: int) -> int:
+    """`position` turned towards `goal`, the short way, by no more than `most`; all 2^-48 turn."""
+    return wrap_bits(position + clip(wrap_bits(goal - position, 48), -most, most), 48)
+
+
+@jit.callee
+def _follow_axis_fixed(state: np.ndarray, most: int, goal: int, i: int) -> None:
+    """The set-point itself, turned by no more than `most` per sample (2^-48 turn)."""
+    now = _turned_fixed(state[HEAD + i], goal, most)
+    later = _turned_fixed(now, goal, most)
+    last = _turned_fixed(later, goal, most)
+    state[PAST + i], state[HEAD + i], state[HEAD_RATE + i] = state[NOW + i], now, 0
+    state[NOW + i] = wrap32(shift_round(now, 16))
+    state[NEXT + i] = wrap32(shift_round(later, 16))
+    state[AHEAD + i] = wrap32(shift_round(last, 16))
+    state[RATE_NOW + i] = sat32(shift_round(wrap_bits(later - now, 48), 12))
+    state[RATE_NEXT + i] = sat32(shift_round(wrap_bits(last - later, 48), 12))
+    state[ACCEL + i] = 0
 
 
 @jit.callee
@@ -115,15 +143,11 @@ def _advance_axis_fixed(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: 
     accel = rate_new - rate
     half = accel if par[KIND] == REFERENCE_PAPER else shift_round(accel, 1)
     position = wrap_bits(position + rate + half, 48)
-    if par[KIND] == REFERENCE_NONE:
-        position, rate, rate_new, accel = shift_round(inp[19 + i], -16), 0, 0, 0
     state[HEAD + i], state[HEAD_RATE + i] = position, rate_new
     head = wrap32(shift_round(position, 16))
     state[ACCEL + i] = sat32(shift_round(accel, 12))
     state[PAST + i] = state[NOW + i]
-    if par[KIND] == REFERENCE_NONE:
-        state[NOW + i], state[NEXT + i], state[AHEAD + i] = head, head, head
-    elif state[LEAD] == 2:
+    if state[LEAD] == 2:
         state[NOW + i], state[NEXT + i], state[AHEAD + i] = state[NEXT + i], state[AHEAD + i], head
         state[RATE_NOW + i], state[RATE_NEXT + i] = state[RATE_NEXT + i], sat32(shift_round(rate, 12))
     else:
@@ -145,8 +169,23 @@ def advance_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray) -> bool:
         state[STARTED] = 1.0
         started = True
     for i in range(3):
-        _advance_axis_float(state, par, inp, i)
+        if par[KIND] == REFERENCE_NONE:
+            _follow_axis_float(state, par[RATE_MAX], inp[19 + i], i)
+        else:
+            _advance_axis_float(state, par, inp, i)
     return started
+
+
+@jit.callee
+def _follow_axis_float(state: np.ndarray, most: float, goal: float, i: int) -> None:
+    """As _follow_axis_fixed(), in rad; where the set-point is reached, ym is that number and no other."""
+    step = wrap_pi(goal - state[HEAD + i])
+    now = goal if abs(step) <= most else state[HEAD + i] + min(max(step, -most), most)
+    step_now = min(max(wrap_pi(goal - now), -most), most)
+    step_next = min(max(wrap_pi(goal - now - step_now), -most), most)
+    state[PAST + i], state[HEAD + i], state[HEAD_RATE + i] = state[NOW + i], now, 0.0
+    state[NOW + i], state[NEXT + i], state[AHEAD + i] = now, now + step_now, now + step_now + step_next
+    state[RATE_NOW + i], state[RATE_NEXT + i], state[ACCEL + i] = step_now, step_next, 0.0
 
 
 @jit.callee
@@ -157,13 +196,9 @@ def _advance_axis_float(state: np.ndarray, par: np.ndarray, inp: np.ndarray, i: 
     rate_new = min(max(rate + accel, -par[RATE_MAX]), par[RATE_MAX])
     accel = rate_new - rate
     position = position + rate + (accel if par[KIND] == REFERENCE_PAPER else 0.5 * accel)
-    if par[KIND] == REFERENCE_NONE:
-        position, rate, rate_new, accel = inp[19 + i], 0.0, 0.0, 0.0
     state[HEAD + i], state[HEAD_RATE + i], state[ACCEL + i] = position, rate_new, accel
     state[PAST + i] = state[NOW + i]
-    if par[KIND] == REFERENCE_NONE:
-        state[NOW + i], state[NEXT + i], state[AHEAD + i] = position, position, position
-    elif state[LEAD] == 2.0:
+    if state[LEAD] == 2.0:
         state[NOW + i], state[NEXT + i], state[AHEAD + i] = state[NEXT + i], state[AHEAD + i], position
         state[RATE_NOW + i], state[RATE_NEXT + i] = state[RATE_NEXT + i], rate
     else:
@@ -191,7 +226,10 @@ _words_fixed, _words_float = jit.compile(words_fixed), jit.compile(words_float)
 
 
 def parameters_fixed(common: Mapping[str, int]) -> list[int]:
-    """Parameter words from CONFIG: k1 Q46, k2 Q30, start Q46, limits in 2^-48 turn (rate: at most 1/4 turn)."""
+    """Parameter words from CONFIG: k1 Q46, k2 Q30, start Q46, limits in 2^-48 turn.
+
+    The rate is at most 1/4 turn per sample, of the set-point itself 1/2 turn.
+    """
     p = common["reference_pole"]
     one_minus, one_plus = (1 << 30) - p, (1 << 30) + p
     zoh = common["reference_kind"] == REFERENCE_ZOH
@@ -201,6 +239,8 @@ def parameters_fixed(common: Mapping[str, int]) -> list[int]:
     start = mul_q(ratio, ratio, 15) if zoh else 0
     accel = shift_round(common["accel_limit"] or INT32_MAX, -16)
     rate = clip(shift_round(common["rate_limit"] or INT32_MAX, -16), 0, RATE_LIMIT_48)
+    if common["reference_kind"] == REFERENCE_NONE:
+        rate = shift_round(common["rate_limit"], -16) if common["rate_limit"] else HALF_TURN_48
     return [common["reference_kind"], k1, k2, start, accel, rate]
 
 
@@ -211,7 +251,7 @@ def parameters_float(common: Mapping[str, int]) -> list[float]:
         common["reference_kind"],
         dequantise(pole, common["reference_pole"], common),
         (common["accel_limit"] or INT32_MAX) * 2.0 * math.pi / 2**32,
-        (common["rate_limit"] or INT32_MAX) * 2.0 * math.pi / 2**32,
+        common["rate_limit"] * 2.0 * math.pi / 2**32 or math.pi,
     )
 
 

@@ -110,12 +110,42 @@ def test_reference_none_is_the_set_point() -> None:
             assert model.words()[:3] == (round(r / 360 * 2**32),) * 3 and model.words()[3:] == (0, 0, 0)
 
 
+def test_a_limited_set_point_turns_at_its_rate_and_stops_on_it() -> None:
+    """From the first reading, the short way round, each step the limit and the last one what is left."""
+    limit = 8_000_000  # 0.67 deg
+    real, integer = models(reference_kind="none", rate_limit=limit, accel_limit=1)
+    ym, goal = 170.0, -170.0
+    for k in range(40):
+        assert step(real, True, 170.0, goal) == step(integer, False, 170.0, goal) == (k == 0)
+        left = (goal - ym + 180.0) % 360.0 - 180.0
+        ym += math.copysign(min(abs(left), limit * BAM / DEG), left)
+        for model, unit in ((real, 1.0), (integer, BAM)):
+            for field, ahead in ((rf.NOW, 0), (rf.NEXT, 1), (rf.AHEAD, 2)):
+                there = min(190.0, ym + ahead * limit * BAM / DEG) if ym <= 190.0 else ym
+                off = (model.state[field] * unit / DEG - there + 180.0) % 360.0 - 180.0
+                assert abs(off) < 1e-6
+        assert real.words() == pytest.approx(integer.words(), abs=2)
+    assert real.state[rf.NOW] == goal * DEG and integer.words() == (round(goal / 360 * 2**32),) * 3 + (0,) * 3
+
+
+def test_a_limited_set_point_says_the_rate_at_which_it_turns() -> None:
+    limit = 2_000_000
+    real, integer = models(reference_kind="none", rate_limit=limit)
+    for model, is_float in ((real, True), (integer, False)):
+        step(model, is_float, 0.0, 1.0)
+        assert model.words() == (limit,) * 6
+        for _ in range(10):
+            step(model, is_float, 0.0, 1.0, fresh=False)  # needs no readings
+        assert model.words() == (round(1.0 / 360 * 2**32),) * 3 + (0, 0, 0)
+
+
 def test_checked_mode() -> None:
     """Extreme poles, limits and set-points: no intermediate leaves int64, the published fields fit int32."""
     rng = np.random.default_rng(5)
     for pole in (0.0, 0.5, 0.999999, 1.0):
-        for kind in ("zoh", "paper"):
-            common = parse_configuration(config_words(MRAC, {"reference_pole": pole, "reference_kind": kind})).common
+        for kind, rate in (("zoh", 0), ("paper", 0), ("none", 0), ("none", 1), ("none", 2**30), ("none", 2**31 - 1)):
+            values = {"reference_pole": pole, "reference_kind": kind, "rate_limit": rate}
+            common = parse_configuration(config_words(MRAC, values)).common
             model = rf.Reference(common, False)
             state, par = model.state.astype(object), np.array(model.par.tolist(), dtype=object)
             advance = rebound(rf.advance_fixed, {})

@@ -125,6 +125,22 @@ def test_the_way_across_the_turn_is_the_short_one() -> None:
     assert made.min() >= 3.0 - 1e-12
 
 
+def test_a_limited_set_point_is_the_ramp() -> None:
+    """From what was reported at the start, and anew from what is reported after the law began again."""
+    limited = Model(REFERENCE_NONE, 2, POLE, 0.004, math.pi)
+    reported = NAN.copy()
+    reported[0], reported[300] = (0.1, 0.0, -3.1), (0.0, 0.0, 0.0)
+    r = setpoints()
+    r[:100, 2] = 3.1
+    made = recompute(limited, r, reported, NAN, [Start(0, True), Start(300, False)])
+    steps = np.abs((np.diff(made, axis=0) + math.pi) % (2 * math.pi) - math.pi)
+    steps[299] = 0.0
+    assert steps.max() <= 0.004 + 1e-12
+    assert made[30] == pytest.approx([0.0, 0.0, 3.1], abs=1e-15)  # x down, z the short way
+    assert made[125, 0] == pytest.approx(26 * 0.004) and made[199, 0] == 0.4
+    assert made[350] == pytest.approx([0.2, -0.2, 0.0])
+
+
 def test_without_model_or_telemetry() -> None:
     r = setpoints()
     assert np.array_equal(recompute(model(REFERENCE_NONE, 1), r, NAN, NAN, []), r)
