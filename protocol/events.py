@@ -48,7 +48,7 @@ class EventKind(NamedTuple):
     b: str
 
 
-_INSTRUMENT = "of (0 attitude sensor, 1 star tracker, 2 gyros, 3 wheels)"
+_INSTRUMENT = "of (0 attitude sensor, 1 star tracker, 2 gyros, 3 wheels, 4 thrusters)"
 _FAULT = "kind (0 off, 1 stuck, 2 garbage, 3 wrong, 4 slow, 5 delayed, 6 intermittent)"
 
 _KINDS = (

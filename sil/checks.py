@@ -262,7 +262,7 @@ def _schedule(scenario: Scenario) -> Iterator[Finding]:
 
 def _wheels(scenario: Scenario) -> Iterator[Finding]:
     wheels = scenario.actuators.wheels
-    for axis in range(3):
+    for axis in range(3 if scenario.actuators.kind == "wheels" else 0):
         speed, inertia, most = (
             wheels.initial_speed_radps[axis],
             wheels.inertia_kgm2[axis],
@@ -296,7 +296,7 @@ def _noise(scenario: Scenario) -> Iterator[Finding]:
 def _disturbance(scenario: Scenario) -> Iterator[Finding]:
     """A constant torque fills the wheels; no law can help that."""
     for axis in range(3):
-        torque, most = scenario.plant.disturbance_Nm.constant_Nm[axis], scenario.actuators.wheels.momentum_max_Nms[axis]
+        torque, most = scenario.plant.disturbance_Nm.constant_Nm[axis], scenario.actuators.momentum_max_Nms[axis]
         if most is not None and abs(torque) * scenario.duration_s > most:
             expected = f"less than momentum_max_Nms ({most:g}) over {scenario.duration_s:g} s"
             got = f"{abs(torque) * scenario.duration_s:g} N m s about axis {'xyz'[axis]}"
@@ -305,7 +305,7 @@ def _disturbance(scenario: Scenario) -> Iterator[Finding]:
 
 def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
     """Largest step through a critically damped reference: peak rate wn * step / e, peak acceleration wn^2 * step."""
-    wn, wheels = scenario.guidance.wn_radps, scenario.actuators.wheels
+    wn, actuators = scenario.guidance.wn_radps, scenario.actuators
     if scenario.guidance.reference == "none":
         if scenario.guidance.accel_limit_degps2 is not None:
             got = f"{scenario.guidance.accel_limit_degps2:g}"
@@ -316,11 +316,11 @@ def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
         yield _warning(scenario, "guidance.wn_radps", expected, shown(wn))
     for axis, step_deg in enumerate(_largest_steps_deg(scenario)):
         step, inertia = math.radians(step_deg), scenario.plant.inertia_kgm2[axis][axis]
-        torque, most_torque = inertia * wn * wn * step, wheels.torque_max_Nm[axis]
-        momentum, most_momentum = inertia * wn * step / math.e, wheels.momentum_max_Nms[axis]
+        torque, most_torque = inertia * wn * wn * step, actuators.chosen.torque_max_Nm[axis]
+        momentum, most_momentum = inertia * wn * step / math.e, actuators.momentum_max_Nms[axis]
         if most_torque is not None and torque > most_torque:
             expected = f"at least {torque:.3g} N m for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
-            yield _warning(scenario, "actuators.wheels.torque_max_Nm", expected, shown(most_torque))
+            yield _warning(scenario, f"actuators.{actuators.kind}.torque_max_Nm", expected, shown(most_torque))
         if most_momentum is not None and momentum > most_momentum:
             expected = f"at least {momentum:.3g} N m s for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
             yield _warning(scenario, "actuators.wheels.momentum_max_Nms", expected, shown(most_momentum))

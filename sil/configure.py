@@ -40,7 +40,7 @@ def orders(scenario: Scenario) -> Orders:
     """CONFIG of a scenario. Raises ConfigError where a value does not fit its word."""
     period_s, table = scenario.period_s, scenario.law_table
     guidance, wire = scenario.guidance, scenario.wire
-    limits = scenario.actuators.wheels.torque_max_Nm
+    limits = scenario.actuators.command_max
     values: dict[str, law_tables.Value] = {
         "form": scenario.law.form,
         "period_us": scenario.period_us,

@@ -20,7 +20,7 @@ from protocol.frames import Reading, Sample
 from sil.clock import Clock
 from sil.commands import Acting, Decides
 from sil.lateness import QUIET, Account, Cause, Wake
-from sil.signals import Actuator, Counterpart, Motion, Plant, Recorder, Sensor, Vector
+from sil.signals import Actuator, Counterpart, Motion, Observer, Plant, Recorder, Sensor, Vector
 
 LARGEST = 2**31 - 1
 
@@ -62,10 +62,12 @@ class Loop:
         clock: Clock,
         bound_deg: float | None = None,
         planned: Iterable[tuple[int, int, int, int]] = (),
+        units: Sequence[Observer] = (),
     ) -> None:
         self.timing, self.scales = timing, scales
         self.plant, self.actuator, self.sensors, self.setpoints = plant, actuator, sensors, setpoints
         self.board, self.commands, self.recorder, self.clock = board, commands, recorder, clock
+        self.units = units  # those of the sensors that look at instants of their own
         self.period_s = timing.period_ns * 1e-9
         self.bound_rad = None if bound_deg is None else math.radians(bound_deg)
         self.planned: dict[int, list[tuple[int, int, int]]] = {}  # events (code, a, b) that the scenario asks for
@@ -92,7 +94,7 @@ class Loop:
         if not delay:
             self.board.drain(k)
             applied = self._limited(self.commands.decide(k), motion, k)
-        self.plant.advance(applied, t_ns, self.timing.period_ns)  # (5)
+        self._integrate(applied, t_ns)  # (5)
         self._record(k, motion, applied)  # (6)
         return motion
 
@@ -179,6 +181,19 @@ class Loop:
         euler, quaternion, rate = readings
         shown = (euler, quaternion, rate)
         return Sample(k, self.setpoints(k), torque, momentum, acting.ack, 0, acting.source, valid, shown)
+
+    def _integrate(self, applied: Vector, t_ns: int) -> None:
+        """To t_k+1. Whoever looks in between sees the truth of that very instant, a whole number of microseconds."""
+        end_ns = t_ns + self.timing.period_ns
+        while (stop_ns := min([end_ns, *[unit.due_ns for unit in self.units]])) < end_ns:
+            self.plant.advance(applied, t_ns, stop_ns - t_ns)
+            motion, t_ns = self.plant.motion(stop_ns), stop_ns
+            if not is_finite(motion):
+                break  # the next tick says so
+            for unit in self.units:
+                if unit.due_ns == stop_ns:
+                    unit.observe(motion)
+        self.plant.advance(applied, t_ns, end_ns - t_ns)
 
     def _record(self, k: int, motion: Motion, applied: Vector) -> None:
         for event in self.planned.get(k, ()):

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,28 +16,22 @@ from protocol.links import LinkError
 from protocol.outages import Disconnected
 from protocol.port import Port
 from sil import scenario_faults, timeline
-from sil.actuators import ACTUATORS
-from sil.actuators import faults as wheel_faults
 from sil.answers import Answers
 from sil.boards import FIRMWARE, BoardHost, BoardOrder, plug_in
 from sil.clock import Clock, clock_rate_q16, new_clock
 from sil.commands import CommandWindow, Decides, ExecutionModel
 from sil.configure import Orders, orders, row_at
-from sil.faulted import Order
-from sil.faulted import orders as fault_orders
+from sil.instruments import actuator_of, sensors_of
 from sil.loop import Loop, Scales, Timing
 from sil.plants import PLANTS
 from sil.plugins import load
 from sil.realtime import may_lock_memory
 from sil.rejoin import Rejoin
 from sil.scenario import Scenario
-from sil.scenario_instruments import Fault
 from sil.scenario_law import is_user_law
 from sil.schedule import read_schedule
-from sil.sensors import SENSORS
-from sil.sensors import faults as sensor_faults
 from sil.session import Session
-from sil.signals import Actuator, Counterpart, Recorder, Sensor
+from sil.signals import Counterpart, Recorder
 from sil.sinks.journal import Direction
 from sil.sinks.journal import Fate as Outcome
 from sil.trouble import LinkFailure, UsageError
@@ -232,7 +225,8 @@ def _scheduled(scenario: Scenario) -> Scheduled:
     file = scenario.file_of("schedule")
     if file is None:
         return Scheduled(np.zeros((scenario.ticks, 3)))
-    return Scheduled(read_schedule(file, scenario.period_s, scenario.ticks))
+    asked = read_schedule(file, scenario.period_s, scenario.ticks)
+    return Scheduled(asked if scenario.actuators.kind == "wheels" else -asked)
 
 
 def _loop(
@@ -240,6 +234,7 @@ def _loop(
 ) -> Loop:
     rows = made.rows if made is not None else ()
     delay = scenario.transport_delay_ticks if made is not None else 0
+    sensors, units = sensors_of(scenario)
     instruments = scenario_faults.given(scenario.sensors, scenario.actuators)
     planned = (
         *timeline.notices(scenario.events, scenario.period_us, scenario.ticks),
@@ -249,8 +244,8 @@ def _loop(
         Timing(scenario.period_ns, delay, scenario.ticks),
         Scales(2.0**-scenario.torque_bits, 2.0**-scenario.wire.momentum_bits),
         load(PLANTS, "plant.kind", scenario.plant.kind).from_scenario(scenario),
-        _wheels(scenario),
-        _sensors(scenario),
+        actuator_of(scenario),
+        sensors,
         lambda tick: row_at(rows, tick),
         board,
         decides,
@@ -258,30 +253,5 @@ def _loop(
         clock,
         scenario.metrics.diverged_deg,
         planned,
+        units,
     )
-
-
-def _sensors(scenario: Scenario) -> list[Sensor]:
-    """The instruments that the scenario switches on."""
-    on = [name for name in SENSORS if getattr(scenario.sensors, name).enabled]
-    return [_sensor(scenario, name) for name in on]
-
-
-def _sensor(scenario: Scenario, name: str) -> Sensor:
-    """The instrument with the faults that are given to it."""
-    unit = {"attitude": 2**32 / 360.0, "rate": math.radians(2.0**scenario.wire.rate_bits)}.get(name, math.radians(1.0))
-    faults = getattr(scenario.sensors, name).faults
-    orders = _fault_orders(scenario, faults, f"sensors.{name}.faults", unit)
-    return sensor_faults.faulty(load(SENSORS, "sensors", name).from_scenario(scenario), orders)
-
-
-def _wheels(scenario: Scenario) -> Actuator:
-    """The wheels with theirs."""
-    wheels = scenario.actuators.wheels
-    orders = _fault_orders(scenario, wheels.faults, "actuators.wheels.faults", 1.0)
-    good = load(ACTUATORS, "actuators", "wheels").from_scenario(scenario)
-    return wheel_faults.faulty(good, orders, wheels.torque_max_Nm)
-
-
-def _fault_orders(scenario: Scenario, faults: Sequence[Fault], path: str, unit: float) -> list[Order]:
-    return fault_orders(faults, path, unit, scenario.period_us, scenario.ticks, scenario.seed)

@@ -25,6 +25,7 @@ from sil.scenario_faults import findings as fault_findings
 from sil.scenario_instruments import Actuators, Sensors
 from sil.scenario_link import Link, faults_problems
 from sil.scenario_metrics import refused_metric
+from sil.scenario_sampling import findings as sampling_findings
 from sil.scenario_sections import (
     Attitude,
     Board,
@@ -42,6 +43,7 @@ from sil.scenario_sections import (
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
 from sil.scenarios import is_file
+from sil.sensors import SENSORS
 from sil.timeline import setpoint_rows
 
 NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out")  # how it is run, not what is run
@@ -76,7 +78,8 @@ class Scenario(Section):
     plant: Plant = Plant()
     actuators: Actuators = Actuators()
     schedule: str | None = None
-    """For board none: CSV of motor torques on the wheels, t,u1,u2,u3, relative to the scenario file."""
+    """For board none: CSV t,u1,u2,u3, relative to the scenario file: motor torques on the wheels, or what thrusters are
+    told."""
     wire: Wire = Wire()
     hold_limit: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     """Misses in a row that hold the last torque; then zero."""
@@ -134,12 +137,11 @@ class Scenario(Section):
     @property
     def torque_bits(self) -> int:
         """wire.torque_bits with its default: 30, lowered until the torque limit fits, 20 without a limit."""
-        limits = self.actuators.wheels.torque_max_Nm
+        largest = self.actuators.largest_on_the_wire
         if self.wire.torque_bits is not None:
             return self.wire.torque_bits
-        if None in limits:
+        if largest is None:
             return 20
-        largest = max(limit for limit in limits if limit is not None)
         return next((bits for bits in range(30, 8, -1) if round(largest * 2**bits) < INT32_MAX), 8)
 
     @property
@@ -268,12 +270,13 @@ def _cross_problems(scenario: Scenario) -> Iterator[Problem]:
         _requirements,
         _inertia,
         _torque_scale,
+        _misalignment,
+        _sampling,
         _files,
         _events,
         _link_faults,
     )
-    for check in checks:
-        yield from check(scenario)
+    yield from dict.fromkeys(problem for check in checks for problem in check(scenario))  # each of them once
 
 
 def _times(scenario: Scenario) -> Iterator[Problem]:
@@ -338,14 +341,30 @@ def _inertia(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _torque_scale(scenario: Scenario) -> Iterator[Problem]:
-    largest = max((limit for limit in scenario.actuators.wheels.torque_max_Nm if limit is not None), default=0.0)
+    limits = [limit for limit in scenario.actuators.chosen.torque_max_Nm if limit is not None]
+    largest = scenario.actuators.largest_on_the_wire or max(limits, default=0.0)
     if largest * 2**scenario.torque_bits >= INT32_MAX:
         fits = math.floor(math.log2(INT32_MAX / largest))
-        key = "actuators.wheels.torque_max_Nm" if scenario.wire.torque_bits is None else "wire.torque_bits"
-        if key == "wire.torque_bits":
-            yield _problem(scenario, key, f"at most {fits}, for a limit of {largest:g} N m", scenario.torque_bits)
+        if scenario.wire.torque_bits is not None:
+            expected = f"at most {fits}, for a limit of {largest:g} N m"
+            yield _problem(scenario, "wire.torque_bits", expected, scenario.torque_bits)
         else:
+            key = f"actuators.{scenario.actuators.kind}.torque_max_Nm"
             yield _problem(scenario, key, f"at most {INT32_MAX / 2**8:.0f} N m", largest)
+
+
+def _misalignment(scenario: Scenario) -> Iterator[Problem]:
+    thrusters = scenario.actuators.thrusters
+    if thrusters.misalignment is not None and thrusters.misalignment_percent:
+        expected = "0 beside misalignment, which says all of it"
+        yield _problem(scenario, "actuators.thrusters.misalignment_percent", expected, thrusters.misalignment_percent)
+
+
+def _sampling(scenario: Scenario) -> Iterator[Problem]:
+    sensors = scenario.sensors
+    for name in (name for name in SENSORS if getattr(sensors, name).enabled):
+        for path, expected, got in sampling_findings(name, sensors.sampling, getattr(sensors, name).sampling):
+            yield _problem(scenario, path, expected, got)
 
 
 def _files(scenario: Scenario) -> Iterator[Problem]:

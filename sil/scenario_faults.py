@@ -14,7 +14,8 @@ from sil.scenario_events import Finding, Span, span, time_findings
 from sil.scenario_instruments import AXES, BIASES, Actuators, Fault, Sensors
 
 KINDS = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
-INSTRUMENTS = ("attitude", "quaternion", "rate", "wheels")
+INSTRUMENTS = ("attitude", "quaternion", "rate", "wheels", "thrusters")
+ACTUATORS = ("wheels", "thrusters")
 KEYS = {
     "wrong": ("scale", *BIASES),
     "slow": ("period_s",),
@@ -40,7 +41,11 @@ def given(sensors: Sensors, actuators: Actuators) -> tuple[Given, ...]:
         Given(name, ("sensors", name, "faults"), getattr(sensors, name).faults, getattr(sensors, name).enabled)
         for name in ("attitude", "quaternion", "rate")
     ]
-    return (*found, Given("wheels", ("actuators", "wheels", "faults"), actuators.wheels.faults, True))
+    found += [
+        Given(name, ("actuators", name, "faults"), getattr(actuators, name).faults, actuators.kind == name)
+        for name in ACTUATORS
+    ]
+    return tuple(found)
 
 
 def notices(instruments: Sequence[Given], period_us: int, ticks: int) -> Iterator[tuple[int, int, int, int]]:
@@ -62,20 +67,27 @@ def findings(sensors: Sensors, actuators: Actuators, period_us: int, ticks: int)
     for instrument in given(sensors, actuators):
         name, path, faults, enabled = instrument
         if faults and not enabled:
-            yield Finding(path, f"faults of a sensor that is on (sensors.{name}.enabled: true)", "false")
+            yield _of_nobody(instrument, actuators)
         for index, fault in enumerate(faults):
             here = (*path, index)
             yield from _times(here, fault, period_us, ticks)
             yield from _keys(here, fault, period_us)
             if name == "quaternion":
                 yield from _of_a_quaternion(here, fault)
-            if name == "wheels" and fault.kind == "garbage":
-                yield from _of_wheels(here, fault, actuators)
+            if name == actuators.kind and fault.kind == "garbage":
+                yield from _of_actuators(here, fault, actuators)
             for other, before in enumerate(faults[:index]):
                 if _contradict(before, fault) and _meet(before, fault, period_us, ticks):
                     yield Finding(
                         (*here, "kind"), f"no overlap with {path[-1]}[{other}], which is {before.kind}", fault.kind
                     )
+
+
+def _of_nobody(instrument: Given, actuators: Actuators) -> Finding:
+    name, path = instrument.name, instrument.path
+    if name in ACTUATORS:
+        return Finding(path, f"faults of the actuator that is there (actuators.kind: {name})", actuators.kind)
+    return Finding(path, f"faults of a sensor that is on (sensors.{name}.enabled: true)", "false")
 
 
 def _times(path: Path, fault: Fault, period_us: int, ticks: int) -> Iterator[Finding]:
@@ -115,8 +127,8 @@ def _of_a_quaternion(path: Path, fault: Fault) -> Iterator[Finding]:
         yield Finding((*path, "scale"), "no scale of a quaternion, a bias_deg", fault.scale)
 
 
-def _of_wheels(path: Path, fault: Fault, actuators: Actuators) -> Iterator[Finding]:
-    limits = dict(zip(AXES, actuators.wheels.torque_max_Nm, strict=True))
+def _of_actuators(path: Path, fault: Fault, actuators: Actuators) -> Iterator[Finding]:
+    limits = dict(zip(AXES, actuators.chosen.torque_max_Nm, strict=True))
     if any(limits[axis] is None for axis in fault.axis or AXES):
         yield Finding((*path, "kind"), "a torque_max_Nm, within which garbage is drawn", fault.kind)
 

@@ -1,4 +1,4 @@
-"""The instruments of a scenario: sensors and wheels, and the faults that are given to them on purpose.
+"""The instruments of a scenario: sensors, wheels or thrusters, and the faults that are given to them on purpose.
 
     sensors: {attitude: {faults: [{kind: stuck, at_s: 100, for_s: 20, axis: x}]}}
     actuators: {wheels: {faults: [{kind: wrong, scale: 0.7, axis: [x, z]}]}}
@@ -8,19 +8,25 @@ A fault is there at every tick with at_s <= t_k < at_s + for_s. Several of one i
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from sil.scenario_sampling import OwnSampling, Sampling, Times, times_of
 from sil.scenario_sections import (
     Expected,
     Lapse,
+    Limits3,
     LimitTriple,
+    Matrix3,
     Moment,
     NotNegative,
     OneOrThree,
     OneOrThreeNotNegative,
+    OneOrThreePositive,
     Section,
+    UnitColumns,
 )
 
 AXES = ("x", "y", "z")
@@ -85,7 +91,7 @@ class RateFault(Fault):
 
 
 class WheelFault(Fault):
-    """A fault of the wheels: it acts on the torque that is commanded, and the wheels' limits on what comes of it."""
+    """A fault of wheels or thrusters: it acts on the command, and their limits on what comes of it."""
 
     bias_Nm: Bias | None = None
     """For wrong: what is added."""
@@ -104,10 +110,62 @@ class Wheels(Section):
     """What goes wrong with them on purpose."""
 
 
+class Thrusters(Section):
+    """Torque from outside, which no wheel takes up: applied = K_T sat(gain * command)."""
+
+    gain: OneOrThreePositive = (1.0, 1.0, 1.0)
+    """N m for each N m that is commanded, or for whatever else a law of one's own commands."""
+    torque_max_Nm: LimitTriple = (0.1, 0.1, 0.1)
+    """Of each axis, before the misalignment."""
+    misalignment_percent: Annotated[float, Field(ge=0, le=50)] = 0.0
+    """p: K_T has p/100 off its diagonal, and columns of norm 1."""
+    misalignment: UnitColumns = None
+    """K_T itself, 3 rows; column j is where the torque of axis j points, in body axes."""
+    faults: tuple[WheelFault, ...] = ()
+    """What goes wrong with them on purpose."""
+
+    @property
+    def K_T(self) -> Matrix3:
+        """Misalignment matrix."""
+        off = self.misalignment_percent / 100.0
+        on = math.sqrt(1.0 - 2.0 * off * off)
+        return self.misalignment or ((on, off, off), (off, on, off), (off, off, on))
+
+
 class Actuators(Section):
     """What turns commands into torque."""
 
+    kind: Literal["wheels", "thrusters"] = "wheels"
+    """Which of the two the satellite has; wheels take up what they give, thrusters do not."""
     wheels: Wheels = Wheels()
+    thrusters: Thrusters = Thrusters()
+
+    @property
+    def chosen(self) -> Wheels | Thrusters:
+        """The section of the actuator that is there."""
+        return self.wheels if self.kind == "wheels" else self.thrusters
+
+    @property
+    def command_max(self) -> Limits3:
+        """The command at which each axis is at its limit, None: no limit."""
+        gain = self.thrusters.gain if self.kind == "thrusters" else (1.0, 1.0, 1.0)
+        x, y, z = (most if most is None else most / g for most, g in zip(self.chosen.torque_max_Nm, gain, strict=True))
+        return x, y, z
+
+    @property
+    def momentum_max_Nms(self) -> Limits3:
+        """(3,) of the wheels; None: no limit, as for thrusters."""
+        return self.wheels.momentum_max_Nms if self.kind == "wheels" else (None, None, None)
+
+    @property
+    def largest_on_the_wire(self) -> float | None:
+        """Largest torque that COMMAND or SAMPLE has to carry; None: no limit."""
+        commands, limits = self.command_max, self.chosen.torque_max_Nm
+        if None in limits:
+            return None
+        K_T = self.thrusters.K_T if self.kind == "thrusters" else ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        applied = [sum(abs(k) * (most or 0.0) for k, most in zip(row, limits, strict=True)) for row in K_T]
+        return max(*applied, *(most or 0.0 for most in commands))
 
 
 class AttitudeSensor(Section):
@@ -119,6 +177,7 @@ class AttitudeSensor(Section):
     """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
     faults: tuple[AttitudeFault, ...] = ()
     """What goes wrong with it on purpose."""
+    sampling: OwnSampling = OwnSampling()
 
 
 class QuaternionSensor(Section):
@@ -130,6 +189,7 @@ class QuaternionSensor(Section):
     """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
     faults: tuple[AttitudeFault, ...] = ()
     """What goes wrong with it on purpose."""
+    sampling: OwnSampling = OwnSampling()
 
 
 class RateSensor(Section):
@@ -141,11 +201,17 @@ class RateSensor(Section):
     """0: the wire's own, 2^-wire.rate_bits rad/s."""
     faults: tuple[RateFault, ...] = ()
     """What goes wrong with it on purpose."""
+    sampling: OwnSampling = OwnSampling()
 
 
 class Sensors(Section):
     """What the board gets to see."""
 
+    sampling: Sampling = Sampling()
     attitude: AttitudeSensor = AttitudeSensor()
     quaternion: QuaternionSensor = QuaternionSensor()
     rate: RateSensor = RateSensor()
+
+    def times_of(self, name: str) -> Times:
+        """When the sensor `name` looks, and how late it tells."""
+        return times_of(self.sampling, getattr(self, name).sampling)

@@ -24,6 +24,9 @@ SLOWEST, FASTEST = 0.01, 1000.0  # N of scaled:N; HELLO carries it as a Q16 numb
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
+COLUMN_OFF = 1e-3  # a misalignment matrix printed with three digits is one
+
+
 class Expected(PydanticCustomError):
     """A refusal that says what would have been accepted."""
 
@@ -84,6 +87,13 @@ def _not_negative(value: object) -> object:
     return numbers
 
 
+def _positive(value: object) -> object:
+    numbers = numbers_of(value if isinstance(value, tuple) else (value,) * 3, 3)
+    if numbers is None or min(numbers) <= 0:
+        raise Expected("a number above 0, or 3 of them")
+    return numbers
+
+
 def _one_or_three(value: object) -> object:
     if (numbers := numbers_of(value if isinstance(value, tuple) else (value,) * 3, 3)) is None:
         raise Expected("a number, or 3 of them")
@@ -103,6 +113,19 @@ def _inertia(value: object) -> object:
     if not _positive_definite(matrix):
         raise Expected("a positive definite matrix")
     return matrix
+
+
+def _unit_columns(value: object) -> object:
+    if value is None:
+        return None
+    rows = tuple(numbers_of(row, 3) for row in value) if isinstance(value, tuple) else ()
+    if len(rows) != 3 or None in rows:
+        raise Expected("3 rows of 3 numbers")
+    norms = [math.hypot(*column) for column in zip(*(row for row in rows if row is not None), strict=True)]
+    if any(abs(norm - 1.0) > COLUMN_OFF for norm in norms):
+        got = ", ".join(f"{norm:.4g}" for norm in norms)
+        raise Expected(f"columns of norm 1 within {COLUMN_OFF:g} (they have {got}; a size belongs into gain)")
+    return rows
 
 
 def _interval(value: object) -> object:
@@ -163,6 +186,8 @@ NUMBER: dict[str, Any] = {"type": "number"}
 Triple = Annotated[Numbers3, BeforeValidator(_triple)]
 OneOrThree = Annotated[Numbers3, BeforeValidator(_one_or_three), _one_or(NUMBER)]
 OneOrThreeNotNegative = Annotated[Numbers3, BeforeValidator(_not_negative), _one_or({**NUMBER, "minimum": 0})]
+OneOrThreePositive = Annotated[Numbers3, BeforeValidator(_positive), _one_or({**NUMBER, "exclusiveMinimum": 0})]
+UnitColumns = Annotated[Matrix3 | None, BeforeValidator(_unit_columns)]
 LimitTriple = Annotated[Limits3, BeforeValidator(_limits), _one_or({"type": ["number", "null"], "exclusiveMinimum": 0})]
 InertiaMatrix = Annotated[
     Matrix3, BeforeValidator(_inertia), _three_of({"anyOf": [NUMBER, _three_of(NUMBER).json_schema]})

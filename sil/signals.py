@@ -59,6 +59,15 @@ class Sensor(Protocol):
         """The reading that leaves at `tick`."""
 
 
+class Observer(Protocol):
+    """A sensor that looks at the truth at instants of its own, not only when it is read."""
+
+    due_ns: int  # the next instant at which it looks
+
+    def observe(self, motion: Motion) -> None:
+        """The truth at `due_ns`; called there in the loop's integration, at a tick its `read` is enough."""
+
+
 class Counterpart(Protocol):
     """The other end of the cable as the loop sees it: a board, or nobody."""
 

@@ -1,10 +1,10 @@
-"""Rigid satellite with three reaction wheels along the body axes, on a circular orbit.
+"""Rigid satellite with three reaction wheels along the body axes, or with thrusters, on a circular orbit.
 
 State: q_BN (4, scalar first), omega_BN_B (3, rad/s), h (3, N m s, absolute wheel momentum about the body axes).
 
     q'   = 1/2 q (x) (0, w)                                  w = omega_BN_B
     J w' = T + T_dist + T_gg - w x (J w + h)                 J = I - Js if the inertia includes the wheels, else I
-    h'   = -T                                                T = torque of the wheels on the body, held by the caller
+    h'   = -T (wheels), 0 (thrusters: T is from outside)     T = torque on the body, held by the caller
     T_gg = 3 w0^2 c3 x (I c3)                                c3 = nadir in body axes, w0 = sqrt(mu / radius^3)
     T_dist = constant + sum_i amplitude_i sin(2 pi t / period_i + phase_i)      body axes, t = simulation time
 
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 MU_EARTH = 3.986004418e14  # m^3/s^2
 
 # Layout of the parameter array that compiled code reads; the sines (5 numbers each) follow.
-J, J_INV, I_GG, T_CONST, SINES = 0, 9, 18, 34, 37
-GG, W0, COS_I, SIN_I, U0, FRAME_O, SEQUENCE = range(27, 34)
+J, J_INV, I_GG, T_CONST, SINES = 0, 9, 18, 35, 38
+GG, W0, COS_I, SIN_I, U0, FRAME_O, SEQUENCE, WHEELS = range(27, 35)
 STATE = 10  # q 0-3, w 4-6, h 7-9
 
 
@@ -53,6 +53,7 @@ class Parameters:
 
     inertia_kgm2: Vector = field(default_factory=lambda: np.diag([2.13, 3.04, 3.09]))  # (3,3)
     inertia_includes_wheels: bool = False
+    wheels: bool = True  # they take up the torque; False: it is from outside, and h stays
     wheel_inertia_kgm2: Vector = field(default_factory=lambda: np.zeros(3))  # (3,) spin inertia, 0: momentum only
     wheel_speed_radps: Vector = field(default_factory=lambda: np.zeros(3))  # (3,) initial, relative to the body
     step_s: float = 0.05
@@ -100,18 +101,19 @@ class Rigid:
         return Motion(t_ns, out[0:4], out[4:7], out[7:10], out[10:13], out[13:16])
 
     def advance(self, torque_B: Vector, t_ns: int, period_ns: int) -> None:
-        """From t_ns to t_ns + period_ns; `torque_B` (3,) N m on the body throughout, its negative on the wheels."""
+        """From t_ns to t_ns + period_ns; `torque_B` (3,) N m on the body throughout; wheels get its negative."""
         period_s = period_ns * 1e-9
         steps = max(1, math.ceil(period_s / self._step_s * (1 - 1e-12)))
         _advance(self.state, torque_B, self._par, t_ns * 1e-9, period_s / steps, steps)
 
 
 def parameters_of(scenario: Scenario) -> Parameters:
-    """The sections plant, actuators.wheels and attitude as numbers."""
+    """The sections plant, actuators and attitude as numbers."""
     plant, wheels, start = scenario.plant, scenario.actuators.wheels, scenario.plant.initial
     return Parameters(
         inertia_kgm2=np.array(plant.inertia_kgm2),
         inertia_includes_wheels=plant.inertia_includes_wheels,
+        wheels=scenario.actuators.kind == "wheels",
         wheel_inertia_kgm2=np.array(wheels.inertia_kgm2),
         wheel_speed_radps=np.array(wheels.initial_speed_radps),
         step_s=plant.step_s,
@@ -141,6 +143,7 @@ def _pack(p: Parameters) -> Vector:
     head[GG], head[W0] = (3.0 * w0 * w0 if p.gravity_gradient else 0.0), w0
     head[COS_I], head[SIN_I], head[U0] = math.cos(tilt), math.sin(tilt), math.radians(p.u0_deg)
     head[FRAME_O], head[SEQUENCE] = float(p.frame == "lvlh"), p.sequence
+    head[WHEELS] = float(p.wheels)
     head[T_CONST:SINES] = p.disturbance_Nm
     tail = [(*s.amplitude_Nm, 2.0 * math.pi / s.period_s, math.radians(s.phase_deg)) for s in p.sines]
     return np.concatenate([head, np.array(tail, dtype=np.float64).ravel()])
@@ -175,9 +178,10 @@ def _derivative(x: Vector, torque: Vector, par: Vector, t0: float, t: float, h0:
     out[1] = 0.5 * (s * wx + qy * wz - qz * wy)
     out[2] = 0.5 * (s * wy + qz * wx - qx * wz)
     out[3] = 0.5 * (s * wz + qx * wy - qy * wx)
-    Hx = par[0] * wx + par[1] * wy + par[2] * wz + h0[0] - torque[0] * t
-    Hy = par[3] * wx + par[4] * wy + par[5] * wz + h0[1] - torque[1] * t
-    Hz = par[6] * wx + par[7] * wy + par[8] * wz + h0[2] - torque[2] * t
+    taken = par[WHEELS]
+    Hx = par[0] * wx + par[1] * wy + par[2] * wz + h0[0] - taken * torque[0] * t
+    Hy = par[3] * wx + par[4] * wy + par[5] * wz + h0[1] - taken * torque[1] * t
+    Hz = par[6] * wx + par[7] * wy + par[8] * wz + h0[2] - taken * torque[2] * t
     Tx = torque[0] + par[T_CONST] - (wy * Hz - wz * Hy)
     Ty = torque[1] + par[T_CONST + 1] - (wz * Hx - wx * Hz)
     Tz = torque[2] + par[T_CONST + 2] - (wx * Hy - wy * Hx)
@@ -225,7 +229,7 @@ def _advance(state: Vector, torque: Vector, par: Vector, t0: float, step: float,
         for i in range(4):
             state[i] /= length
     for i in range(3):
-        state[7 + i] = h0[i] - torque[i] * (steps * step)
+        state[7 + i] = h0[i] - par[WHEELS] * torque[i] * (steps * step)
 
 
 @jit.compile

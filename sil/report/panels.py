@@ -209,15 +209,16 @@ PER_AXIS: Mapping[str, tuple[AxisPanel, Callable[[Run, Look], Iterable[Line2D]]]
 
 
 def _limits(ax: Axes, limits: Array, factor: float, look: Look) -> None:
-    """The wheels' limits, as lines on both sides of zero."""
+    """The actuators' limits, as lines on both sides of zero."""
     for value in limits:
         for sign in (-1, 1):
             ax.axhline(sign * value * factor, color=look.ink, lw=0.9, ls="-.")
 
 
 def near_limits(run: Run, axes: Sequence[int], key: str = "torque_max_Nm", name: str = "applied_Nm") -> Array:
-    """Limits actuators.wheels.`key` of these axes, where the values `name` come near them."""
-    limits = ((run.scenario.get("actuators") or {}).get("wheels") or {}).get(key)
+    """Limits `key` of the actuators on these axes, where the values `name` come near them."""
+    actuators = run.scenario.get("actuators") or {}
+    limits = (actuators.get(actuators.get("kind", "wheels")) or {}).get(key)
     values = run[name]
     if limits is None or not np.isfinite(values).any():
         return np.empty(0)

@@ -33,7 +33,7 @@ SOURCES = {FRESH: "fresh", HELD: "held", ZERO: "zero"}
 
 def plan_of(scenario: Scenario, rig: Rig) -> Plan:
     """The titles, limits and lengths of a run."""
-    wheels = scenario.actuators.wheels
+    actuators = scenario.actuators
     period_ms = scenario.period_ns * 1e-6
     if rig.answers is None:
         law, follows = "no controller", ""
@@ -51,8 +51,8 @@ def plan_of(scenario: Scenario, rig: Rig) -> Plan:
         min(scenario.ticks * scenario.period_ns * 1e-9, WINDOW_S),
         scenario.period_ns * 1e-9,
         period_ms / rig.clock.scale if rig.clock.paced else None,
-        wheels.torque_max_Nm,
-        wheels.momentum_max_Nms,
+        actuators.command_max,
+        actuators.momentum_max_Nms,
         follows,
     )
 

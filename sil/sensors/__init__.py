@@ -5,3 +5,4 @@ SENSORS: dict[str, str] = {
     "quaternion": "sil.sensors.quaternion:Quaternion",
     "rate": "sil.sensors.rate:Rate",
 }
+SUPPORT = ("sampled",)  # what goes around them

@@ -48,7 +48,8 @@ def motion_at(t_ns: int = 0) -> Motion:
 @pytest.mark.parametrize(("folder", "registry"), FOLDERS, ids=IDS)
 def test_every_file_is_registered_and_every_entry_is_a_file(folder: ModuleType, registry: dict[str, str]) -> None:
     assert folder.__file__ is not None
-    files = {path.stem for path in Path(folder.__file__).parent.glob("*.py")} - {"__init__"}
+    others = {"__init__", *getattr(folder, "SUPPORT", ())}
+    files = {path.stem for path in Path(folder.__file__).parent.glob("*.py")} - others
     modules = [entry.partition(":")[0] for entry in registry.values()]
     assert sorted(modules) == sorted(f"{folder.__name__}.{file}" for file in files)
 

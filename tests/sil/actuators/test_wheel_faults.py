@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sil.actuators.faults import FAULTS
-from sil.rig import _wheels
+from sil.instruments import actuator_of
 from sil.scenario import load_values
 
 TICKS = 60  # of 0.5 s
@@ -14,7 +14,7 @@ TICKS = 60  # of 0.5 s
 
 def wheels(*faults, seed=0, ticks=TICKS, **section):
     values = {"faults": faults, "momentum_max_Nms": None, **section}
-    return _wheels(load_values({"actuators": {"wheels": values}, "duration_s": ticks * 0.5, "seed": seed}))
+    return actuator_of(load_values({"actuators": {"wheels": values}, "duration_s": ticks * 0.5, "seed": seed}))
 
 
 def command(tick):

@@ -9,8 +9,8 @@ import pytest
 
 from sil import sensors
 from sil.faulted import orders
+from sil.instruments import sensors_of
 from sil.plugins import load
-from sil.rig import _sensors
 from sil.scenario import load_values
 from sil.sensors import SENSORS
 from sil.sensors.faults import FAULTS
@@ -33,7 +33,7 @@ def truth(tick):
 def sensor(name, *faults, seed=0, ticks=TICKS):
     values = {"enabled": True, "faults": faults}
     only = {"attitude": {"enabled": False}, name: values}
-    (made,) = _sensors(load_values({"sensors": only, "duration_s": ticks * 0.5, "seed": seed}))
+    ((made,), _) = sensors_of(load_values({"sensors": only, "duration_s": ticks * 0.5, "seed": seed}))
     return made
 
 
