@@ -23,6 +23,7 @@ from protocol.law_words import (
     REFERENCE_NONE,
     REFERENCE_PAPER,
     REFERENCE_ZOH,
+    SEQUENCE_321,
     STALE_REUSE,
     USER_LAW_ID,
     LawTable,
@@ -88,6 +89,7 @@ COMMON: tuple[Word, ...] = (
     Word("setpoint_source", "", 0, 0, 1, 0, "where the set-point comes from", ("table", "sample")),
     Word("guidance_rows", "", 0, 0, 4096, 0, "number of guidance rows after the law's parameters"),
     Word("stale", "", 0, 0, 1, 0, "without a usable SAMPLE", ("propagate", "reuse")),
+    Word("attitude_sequence", "", 0, 0, 1, 0, "of all Euler angles: yaw first, or roll first", ("321", "123")),
 )
 
 ROW_WORDS = 4  # tick, x, y, z
@@ -153,8 +155,8 @@ def config_words(table: LawTable, values: Mapping[str, Value], rows: Sequence[Se
     Raises ConfigError for unknown names, values out of range, and what the law itself excludes.
     """
     flat = expand(table, values)
-    variant = table.variant(_defaults(table, flat))
-    flat = {**variant.defaults, "reference_lead": variant.reference_leads[0], "readings_mask": table.needs, **flat}
+    variant = variant_of(table, flat)
+    flat = {**variant.defaults, "reference_lead": variant.reference_leads[0], "readings_mask": variant.needs, **flat}
     flat |= {"law_id": table.law_id, "law_version": table.version, "guidance_rows": len(rows)}
     words: dict[str, int] = {}
     for word in (*COMMON, *table.params):
@@ -163,6 +165,12 @@ def config_words(table: LawTable, values: Mapping[str, Value], rows: Sequence[Se
             value = _automatic_bits(table, word, flat)
         words[word.name] = quantise(word, value, words)
     return (*words.values(), *(n for row in rows for n in row))
+
+
+def variant_of(table: LawTable, values: Mapping[str, Value]) -> Variant:
+    """The design of the law that these values, and its defaults for the others, choose."""
+    flat = expand(table, values)
+    return table.variant({word.name: number_of(word, flat.get(word.name, word.default)) for word in table.params})
 
 
 def expand(table: LawTable, values: Mapping[str, Value]) -> dict[str, float | str | bool]:
@@ -192,10 +200,6 @@ def _triple(name: str, value: Value) -> Sequence[float]:
 def _unknown(table: LawTable, name: str) -> str:
     known = sorted({word.name.removesuffix("_x") for word in table.params if not word.name.endswith(("_y", "_z"))})
     return f"law.params.{name}: unknown for law {table.name}; known: {', '.join(known)}"
-
-
-def _defaults(table: LawTable, flat: Mapping[str, float | str | bool]) -> dict[str, float]:
-    return {word.name: number_of(word, flat.get(word.name, word.default)) for word in table.params}
 
 
 def _automatic_bits(table: LawTable, bits: Word, flat: Mapping[str, float | str | bool]) -> float:
@@ -266,7 +270,7 @@ def _rows(words: Sequence[int], start: int) -> tuple[tuple[int, int, int, int], 
 
 
 def refusal(configuration: Configuration) -> str | None:
-    """Why the law cannot fly with this configuration, in one line, or None: delay, lead, period, readings."""
+    """Why the law cannot fly with this configuration, in one line, or None: period, delay, lead, readings, angles."""
     table, common = configuration.table, configuration.common
     variant = table.variant(configuration.values)
     low, high = table.period_s
@@ -281,9 +285,15 @@ def refusal(configuration: Configuration) -> str | None:
     for name in table.finite_in_fixed:
         if common["form"] == FORM_FIXED and configuration.params[name] == NO_LIMIT:
             return f"law {table.name}: expected a finite {name} in the fixed form, got no limit"
-    if table.needs & ~common["readings_mask"]:
-        return f"law {table.name}: expected readings_mask with bits {table.needs}, got {common['readings_mask']}"
+    if variant.needs & ~common["readings_mask"]:
+        return f"law {table.name}: expected readings_mask with bits {variant.needs}, got {common['readings_mask']}"
+    if table.only_321 and configuration.values[table.only_321] and common["attitude_sequence"] != SEQUENCE_321:
+        return f"law {_form_321(table)}: expected attitude_sequence 321, got 123"
     return None
+
+
+def _form_321(table: LawTable) -> str:
+    return table.name if table.only_321 == "law_id" else f"{table.name} with {table.only_321}"
 
 
 def table_text(table: LawTable) -> str:

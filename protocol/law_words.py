@@ -10,6 +10,7 @@ from protocol.words import Word
 FORM_FIXED, FORM_FLOAT = 0, 1
 REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
 STALE_PROPAGATE, STALE_REUSE = 0, 1
+SEQUENCE_321, SEQUENCE_123 = 0, 1
 USER_LAW_ID = 0xFFFF
 READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
 AXES = ("x", "y", "z")
@@ -17,17 +18,18 @@ AUTOMATIC = -1.0  # default of a word with fractional bits: as many as the value
 
 
 class Variant(NamedTuple):
-    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ."""
+    """One design of a law: delays n it can live with, leads d of the reference, defaults that differ, readings."""
 
     transport_delays: tuple[int, ...]
     reference_leads: tuple[int, ...]
     defaults: Mapping[str, float] = {}
+    needs: int = READ_EULER
 
 
 class LawTable(NamedTuple):
     """One law, one version. With lead d, r(k) first shows in ym(k + d); the first allowed lead is the default.
 
-    `variants`, if any, is indexed by the value of the word `variant_word`.
+    `variants`, if any, is indexed by the value of the word `variant_word`; `needs` are the readings with the defaults.
     """
 
     law_id: int
@@ -42,12 +44,13 @@ class LawTable(NamedTuple):
     variant_word: str = ""
     variants: tuple[Variant, ...] = ()
     finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
+    only_321: str = ""  # word that, where it is not 0, makes this a law for 3-2-1 angles only; law_id: always
 
     def variant(self, params: Mapping[str, float]) -> Variant:
         """The design that these parameter values choose; of a law with one design, that one."""
         if self.variant_word:
             return self.variants[int(params[self.variant_word])]
-        return Variant(self.transport_delays, self.reference_leads)
+        return Variant(self.transport_delays, self.reference_leads, {}, self.needs)
 
 
 def vector(name: str, unit: str, q: int | str, low: float, high: float, default: Sequence[float], about: str,

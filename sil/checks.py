@@ -17,7 +17,7 @@ from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
 from protocol.laws import IN_C
 from sil import scenario_law as laws
 from sil.boards import FIRMWARE, WITHOUT_TIMER
-from sil.configure import Orders, orders
+from sil.configure import orders
 from sil.scenario import Scenario, load_scenario
 from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
 from sil.scenario_events import RESTART
@@ -110,7 +110,7 @@ def _law(scenario: Scenario) -> Iterator[Finding]:
     if len(made.words) > MAX_WORDS:
         got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
         yield _error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
-    found = [*_law_period(scenario), *_law_delay(scenario, made)]
+    found = [*_law_period(scenario), *_law_delay(scenario)]
     yield from found
     reason = refusal(made.configuration)
     if reason is not None and not found:
@@ -124,16 +124,17 @@ def _law_period(scenario: Scenario) -> Iterator[Finding]:
         yield _error(scenario, "period_s", expected, shown(scenario.period_s))
 
 
-def _law_delay(scenario: Scenario, made: Orders) -> Iterator[Finding]:
-    delays = scenario.law_table.variant(made.configuration.values).transport_delays
+def _law_delay(scenario: Scenario) -> Iterator[Finding]:
+    delays = scenario.law_variant.transport_delays
     if scenario.transport_delay_ticks not in delays:
         expected = f"{' or '.join(map(str, delays))} for law {scenario.law.name}"
         yield _error(scenario, "transport_delay_ticks", expected, shown(scenario.transport_delay_ticks))
 
 
 def _sensors(scenario: Scenario) -> Iterator[Finding]:
+    needs = scenario.law_variant.needs
     for bit, name in enumerate(SENSORS):
-        if scenario.law_table.needs >> bit & 1 and not getattr(scenario.sensors, name).enabled:
+        if needs >> bit & 1 and not getattr(scenario.sensors, name).enabled:
             yield _error(scenario, f"sensors.{name}.enabled", f"true, law {scenario.law.name} reads it", "false")
 
 

@@ -60,6 +60,7 @@ def orders(scenario: Scenario) -> Orders:
         "accel_limit": _bam(guidance.accel_limit_degps2 or 0.0, period_s**2),
         "setpoint_source": guidance.setpoint_source,
         "stale": scenario.stale,
+        "attitude_sequence": str(scenario.attitude.sequence),
         **scenario.law_values(),
     }
     rows = guidance_rows(scenario)

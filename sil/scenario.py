@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError
 
-from protocol.law_tables import INT32_MAX, LawTable
+from protocol.law_tables import INT32_MAX, LawTable, Variant, variant_of
 from sil import scenario_law as laws
 from sil.plants import PLANTS
 from sil.profiles import PROFILES, SetpointRow, setpoints
@@ -148,6 +148,11 @@ class Scenario(Section):
     def law_table(self) -> LawTable:
         """The table of the law and version that fly."""
         return self._table
+
+    @property
+    def law_variant(self) -> Variant:
+        """The design of the law that law.params choose: delays, leads, readings."""
+        return variant_of(self._table, self.law_values())
 
     def law_values(self) -> dict[str, Any]:
         """law.params as protocol.law_tables.config_words() takes them."""

@@ -130,9 +130,10 @@ typedef struct {{
     uint8_t bits_word; /* index in CONFIG */
 }} range_scale;
 
-/* A design of a law: bit n of delays set: it can live with transport delay n; bit d of leads: with reference lead d. */
+/* A design of a law: bit n of delays set: it can live with transport delay n; bit d of leads: with reference lead d.
+ * needs: readings, as in readings_mask. */
 typedef struct {{
-    uint8_t delays, leads;
+    uint8_t delays, leads, needs;
 }} law_variant;
 
 /* One law, one version. */
@@ -143,9 +144,9 @@ typedef struct {{
     int32_t period_us_min, period_us_max;
     law_variant variants[{max(len(_variants(table)) for table in C_LAWS)}]; /* by the value of variant_word */
     uint8_t words;
-    uint8_t needs;        /* readings */
     uint8_t variant_word; /* law word, NO_WORD: there is one design */
     uint8_t finite_word;  /* law word that may not say "no limit" in fixed point, or NO_WORD */
+    uint8_t only_321;     /* CONFIG word that, where it is not 0, excludes other angles than 3-2-1, or NO_WORD */
 }} law_table;
 
 extern const word_range COMMON_RANGES[COMMON_WORDS];
@@ -233,22 +234,26 @@ def _int32(number: int) -> str:
 
 
 def _variants(table: LawTable) -> tuple[Variant, ...]:
-    return table.variants or (Variant(table.transport_delays, table.reference_leads),)
+    return table.variants or (Variant(table.transport_delays, table.reference_leads, {}, table.needs),)
 
 
 def _table_entry(table: LawTable) -> str:
     low, high = table.period_s
-    variants = ", ".join(f"{{{_mask(v.transport_delays)}, {_mask(v.reference_leads)}}}" for v in _variants(table))
+    variants = ", ".join(
+        f"{{{_mask(v.transport_delays)}, {_mask(v.reference_leads)}, {v.needs}}}" for v in _variants(table)
+    )
     names = [word.name for word in table.params]
     variant_word = names.index(table.variant_word) if table.variant_word else NO_WORD
     assert len(table.finite_in_fixed) <= 1
     finite = names.index(table.finite_in_fixed[0]) if table.finite_in_fixed else NO_WORD
-    shown = [str(n) if n != NO_WORD else "NO_WORD" for n in (variant_word, finite)]
+    everything = [word.name for word in (*COMMON, *table.params)]
+    only_321 = everything.index(table.only_321) if table.only_321 else NO_WORD
+    shown = ", ".join(str(n) if n != NO_WORD else "NO_WORD" for n in (variant_word, finite, only_321))
     crc = zlib.crc32(table_text(table).encode())
     return (
         f"    {{{table.law_id}, {table.version}, 0x{crc:08X}, {_prefix(table)}_RANGES,"
         f" {math.ceil(Fraction(low * 1e6))}, {math.floor(Fraction(high * 1e6))}, {{{variants}}},"
-        f" {_prefix(table)}_WORDS, {table.needs}, {shown[0]}, {shown[1]}}}, /* {table.name} */\n"
+        f" {_prefix(table)}_WORDS, {shown}}}, /* {table.name} */\n"
     )
 
 

@@ -168,8 +168,11 @@ def one_law(law: LawTable) -> str:
     )
     for index, variant in enumerate(law.variants):
         delays, leads = (", ".join(map(str, x)) for x in (variant.transport_delays, variant.reference_leads))
-        other = "".join(f"; default `{name}` {value:g}" for name, value in variant.defaults.items())
+        other = f"; readings mask {variant.needs}" if variant.needs != law.needs else ""
+        other += "".join(f"; default `{name}` {value:g}" for name, value in variant.defaults.items())
         text += f"`{law.variant_word}` = {index}: n {delays}; d {leads}{other}.\n"
+    if law.only_321:
+        text += f"Euler angles 3-2-1 only{'' if law.only_321 == 'law_id' else f', where `{law.only_321}` is not 0'}.\n"
     text += f"\nCONFIG:\n\n{table(WORD_HEAD, word_rows(law.params, len(COMMON)))}"
     return text + f"\nTELEMETRY:\n\n{table(WORD_HEAD, word_rows(law.telemetry, len(TELEMETRY_COMMON)))}"
 

@@ -119,7 +119,7 @@ static uint16_t bad_row(const int32_t *words, size_t from, size_t to) {
     return NO_INDEX;
 }
 
-/* What the law's table says of period, delay, lead, arithmetic and readings. */
+/* What the law's table says of period, delay, lead, arithmetic, readings and angles. */
 static bool table_allows(const int32_t *words, const law_table *table) {
     const int32_t *params = words + COMMON_WORDS;
     const law_variant *v = &table->variants[table->variant_word == NO_WORD ? 0 : params[table->variant_word]];
@@ -128,7 +128,9 @@ static bool table_allows(const int32_t *words, const law_table *table) {
            (v->delays >> words[COMMON_TRANSPORT_DELAY_TICKS] & 1) != 0 &&
            (v->leads >> words[COMMON_REFERENCE_LEAD] & 1) != 0 &&
            (table->finite_word == NO_WORD || params[table->finite_word] != INT32_MAX) &&
-           (table->needs & ~words[COMMON_READINGS_MASK]) == 0;
+           (v->needs & ~words[COMMON_READINGS_MASK]) == 0 &&
+           (table->only_321 == NO_WORD || words[table->only_321] == 0 ||
+            words[COMMON_ATTITUDE_SEQUENCE] == COMMON_ATTITUDE_SEQUENCE_321);
 }
 
 /* crc32(W, crc32(T)) of section 8.3. */

@@ -27,4 +27,5 @@ APPC = LawTable(
     period_s=(0.2, 1.0),
     reference_leads=(2,),
     needs=READ_EULER,
+    only_321="law_id",  # always: it predicts and steers in Euler angles 3-2-1
 )

@@ -38,4 +38,5 @@ MRAC = LawTable(
     variant_word="design",
     variants=(Variant((0, 1), (1,), {"c2_pole": 0.001}), Variant((1,), (2,))),
     finite_in_fixed=("trace_max",),  # F is int32 with 20 fractional bits
+    only_321="decouple",
 )

@@ -25,6 +25,7 @@ from protocol.law_tables import (
     refusal,
     table_hash,
     user_table,
+    variant_of,
 )
 from protocol.laws.appc import APPC
 from protocol.laws.mrac import MRAC
@@ -163,3 +164,26 @@ def test_words_are_well_formed(table: LawTable) -> None:
         if isinstance(word.q, int) and math.isfinite(word.maximum):
             for edge in (word.minimum, word.maximum):
                 assert dequantise(word, quantise(word, edge, {}), {}) == pytest.approx(edge, abs=2.0**-word.q)
+
+
+@tables
+def test_readings_are_those_of_the_design(table: LawTable) -> None:
+    assert variant_of(table, {}).needs == table.needs
+    for value, variant in enumerate(table.variants):
+        configuration = parse_configuration(config_words(table, {table.variant_word: value}))
+        assert configuration.common["readings_mask"] == variant.needs
+
+
+@pytest.mark.parametrize(
+    ("table", "values", "says"),
+    [
+        (APPC, {}, "law appc: expected attitude_sequence 321, got 123"),
+        (MRAC, {"decouple": 1}, "law mrac with decouple: expected attitude_sequence 321, got 123"),
+        (MRAC, {}, None),
+        (PD, {}, None),
+    ],
+)
+def test_a_law_for_321_refuses_123(table: LawTable, values: dict[str, float], says: str | None) -> None:
+    """Its kinematics would be those of other angles, and nothing else would show it."""
+    assert refusal(parse_configuration(config_words(table, {**values, "attitude_sequence": "123"}))) == says
+    assert refusal(parse_configuration(config_words(table, {**values, "attitude_sequence": "321"}))) is None

@@ -4,8 +4,8 @@
 
 const range_scale RANGE_SCALES[] = {
     {4835703278458517, 4503599627370496, -82, 0, 10}, /* torque_bits: -1e-09 to inf */
-    {8589934600589943, 8589934600589943, -33, -33, 25}, /* kp_bits: -1000000.001 to 1000000.001 */
-    {8589934600589943, 8589934600589943, -33, -33, 26}, /* kd_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 26}, /* kp_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 27}, /* kd_bits: -1000000.001 to 1000000.001 */
 };
 
 const word_range COMMON_RANGES[COMMON_WORDS] = {
@@ -34,6 +34,7 @@ const word_range COMMON_RANGES[COMMON_WORDS] = {
     {0, 1, NO_WORD}, /* setpoint_source */
     {0, 4096, NO_WORD}, /* guidance_rows */
     {0, 1, NO_WORD}, /* stale */
+    {0, 1, NO_WORD}, /* attitude_sequence */
 };
 
 static const word_range PD_RANGES[PD_WORDS] = {
@@ -79,7 +80,7 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
 };
 
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
-    {1, 1, 0x5D6B03B6, PD_RANGES, 5000, 10000000, {{0x1F, 0x06}}, PD_WORDS, 1, NO_WORD, NO_WORD}, /* pd */
-    {2, 1, 0x7879CC71, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02}, {0x02, 0x04}}, MRAC_WORDS, 1, 0, 4}, /* mrac */
-    {3, 1, 0x28359648, APPC_RANGES, 200000, 1000000, {{0x02, 0x04}}, APPC_WORDS, 1, NO_WORD, NO_WORD}, /* appc */
+    {1, 1, 0x28D41CC3, PD_RANGES, 5000, 10000000, {{0x1F, 0x06, 1}}, PD_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* pd */
+    {2, 1, 0x5C9EFFBA, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02, 1}, {0x02, 0x04, 1}}, MRAC_WORDS, 0, 4, 32}, /* mrac */
+    {3, 1, 0x2A4D5A9F, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
 };

@@ -37,7 +37,8 @@ enum {
     COMMON_SETPOINT_SOURCE = 22,         /* where the set-point comes from */
     COMMON_GUIDANCE_ROWS = 23,           /* number of guidance rows after the law's parameters */
     COMMON_STALE = 24,                   /* without a usable SAMPLE */
-    COMMON_WORDS = 25
+    COMMON_ATTITUDE_SEQUENCE = 25,       /* of all Euler angles: yaw first, or roll first */
+    COMMON_WORDS = 26
 };
 
 /* CONFIG words of pd, from the law's first. */
@@ -159,6 +160,7 @@ enum { COMMON_FORM_FIXED = 0, COMMON_FORM_FLOAT = 1 };
 enum { COMMON_REFERENCE_KIND_NONE = 0, COMMON_REFERENCE_KIND_ZOH = 1, COMMON_REFERENCE_KIND_PAPER = 2 };
 enum { COMMON_SETPOINT_SOURCE_TABLE = 0, COMMON_SETPOINT_SOURCE_SAMPLE = 1 };
 enum { COMMON_STALE_PROPAGATE = 0, COMMON_STALE_REUSE = 1 };
+enum { COMMON_ATTITUDE_SEQUENCE_321 = 0, COMMON_ATTITUDE_SEQUENCE_123 = 1 };
 enum { MRAC_DESIGN_PRINTED = 0, MRAC_DESIGN_REPAIRED = 1 };
 enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };
@@ -187,9 +189,10 @@ typedef struct {
     uint8_t bits_word; /* index in CONFIG */
 } range_scale;
 
-/* A design of a law: bit n of delays set: it can live with transport delay n; bit d of leads: with reference lead d. */
+/* A design of a law: bit n of delays set: it can live with transport delay n; bit d of leads: with reference lead d.
+ * needs: readings, as in readings_mask. */
 typedef struct {
-    uint8_t delays, leads;
+    uint8_t delays, leads, needs;
 } law_variant;
 
 /* One law, one version. */
@@ -200,9 +203,9 @@ typedef struct {
     int32_t period_us_min, period_us_max;
     law_variant variants[2]; /* by the value of variant_word */
     uint8_t words;
-    uint8_t needs;        /* readings */
     uint8_t variant_word; /* law word, NO_WORD: there is one design */
     uint8_t finite_word;  /* law word that may not say "no limit" in fixed point, or NO_WORD */
+    uint8_t only_321;     /* CONFIG word that, where it is not 0, excludes other angles than 3-2-1, or NO_WORD */
 } law_table;
 
 extern const word_range COMMON_RANGES[COMMON_WORDS];
