@@ -9,7 +9,7 @@ is opened (rejoin.py): in lockstep `drain` waits for it, too; a paced clock goes
 from __future__ import annotations
 
 import time
-from array import array
+from collections import deque
 from collections.abc import Callable, Sequence
 
 from protocol import frames
@@ -22,12 +22,14 @@ from sil.rejoin import Rejoin
 from sil.session import says_restart
 from sil.signals import Recorder
 from sil.sinks.journal import NO_ANSWER, Direction
+from sil.sinks.journal import Fate as Outcome
 from sil.trouble import LinkFailure
 
 LOOK_EVERY_S = 0.25
 ASK_AFTER_S = 1.0  # of silence, and as often: a board that restarted may have had nobody to tell
 INTERRUPTED_WAIT_ns = 1_000_000_000
 REMEMBERED_TICKS = 256
+RECENT_ANSWERS = 1000  # whose times are kept for whoever watches; the log has them all
 EARLY_LIMIT = 1024  # frames; a laboratory that stood still for longer has lost the rest
 ANSWERS = (Type.COMMAND, Type.TELEMETRY, Type.EVENT)
 
@@ -67,9 +69,11 @@ class Answers:
         self._sent_wall_ns = 0
         self._advanced_wall_ns = self._asked_wall_ns = time.monotonic_ns()
         self._knows_us = False  # it was asked since its last answer, and is in session
-        self.answer_ns = array("q")
+        self.answered = 0  # answers that came before the next SAMPLE left ...
+        self.answer_ns: deque[int] = deque(maxlen=RECENT_ANSWERS)  # ... and how long the newest of them took
         self.last_answer_ns = NO_ANSWER
         self.telemetry: Telemetry | None = None  # the newest that came, for whoever watches
+        self.corrupted = 0  # frames that the modelled link altered, copies apart
         self.strays = 0  # frames that belong to no answer under way: repeated, too old, too far ahead; dropped
         self._sample_size = 0  # bytes on the wire
 
@@ -127,6 +131,7 @@ class Answers:
     ) -> None:
         fate = copy.fate
         outcome, cause = copy.outcome(in_time), copy.cause(in_time, why_late)
+        self.corrupted += outcome == Outcome.CORRUPTED and not copy.number
         self._recorder.packet(tick, direction, outcome, packet, cause, copy.number, fate.arrival_ns, copy.wire)
 
     @staticmethod
@@ -270,6 +275,7 @@ class Answers:
             self._window.board_was_faster(tick)
         if tick == self._tick:
             self.last_answer_ns = now_ns - self._sent_wall_ns
+            self.answered += 1
             self.answer_ns.append(self.last_answer_ns)
         self._events = 0
         copies = self._copies(packet, 0)

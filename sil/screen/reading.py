@@ -129,11 +129,10 @@ class Reader:
             self._pair(tick)
         self._every = max(self._least, (tick - self._looked) // SAMPLES_A_LOOK)
         self._looked = tick
-        loop, answers = self._rig.loop, self._rig.answers
+        loop = self._rig.loop
         acting = loop.commands.acting
         h_x, h_y, h_z = motion.momentum_B.tolist()
         late_ns = loop.lateness_ns
-        answer_ns = answers.answer_ns if answers is not None else []
         return State(
             self._time_s(tick),
             time.monotonic() - self._began_s,
@@ -143,18 +142,23 @@ class Reader:
             SOURCES.get(acting.source, ""),
             (h_x, h_y, h_z),
             late_ns[max(self._late_seen, len(late_ns) - MOST_NEW) :].tolist(),
-            list(answer_ns[max(self._answers_seen, len(answer_ns) - MOST_NEW) :]),
+            self._new_answers_ns(),
             loop.rebased_ticks,
             self.counters(),
             list(self._samples),
             list(self._events),
         )
 
+    def _new_answers_ns(self) -> list[int]:
+        answers = self._rig.answers
+        new = answers.answered - self._answers_seen if answers is not None else 0
+        return list(answers.answer_ns)[-min(new, MOST_NEW) :] if answers is not None and new else []
+
     def told(self) -> None:
         """The last State arrived."""
         self._late_seen = len(self._rig.loop.lateness_ns)
         if self._rig.answers is not None:
-            self._answers_seen = len(self._rig.answers.answer_ns)
+            self._answers_seen = self._rig.answers.answered
         self._samples.clear()
         self._events.clear()
 
@@ -170,6 +174,7 @@ class Reader:
             "real_misses": rig.window.real_misses,
             "overruns": self._overruns,
             "restarts": len(rig.rejoin.ticks) if rig.rejoin is not None else 0,
+            "corrupted": rig.answers.corrupted,
             "crc_errors": port.crc_errors,
             "discarded_bytes": port.discarded_bytes,
             "unknown": port.unknown,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from array import array
 from collections import Counter
 from collections.abc import Mapping
 from itertools import groupby
@@ -197,6 +198,7 @@ class TimingRows:
             ("/housekeeping/down", layouts.HOUSEKEEPING),
         )
         self._channels = _register(writer, topics)
+        self.answers_ns = array("q")  # SAMPLE to COMMAND, of every tick whose answer came
 
     def host(self, content: Mapping[str, Any]) -> None:
         """HOST: metadata `host`."""
@@ -209,8 +211,10 @@ class TimingRows:
                 code, a, b = jn.read_event(record.payload)
                 data, topic = layouts.EVENT.pack(tick, a, b, code, 0), "/event"
             elif record.kind == Kind.TIMING:
-                *times_ns, cause = jn.read_timing(record.payload)
+                *times_ns, cause = timing = jn.read_timing(record.payload)
                 data, topic = layouts.TIMING.pack(*times_ns, tick, cause), "/timing"
+                if timing.answer_ns != jn.NO_ANSWER:
+                    self.answers_ns.append(timing.answer_ns)
             else:
                 direction, host_ns, packet = jn.read_housekeeping(record.payload)
                 data = layouts.HOUSEKEEPING.pack(host_ns, packet)

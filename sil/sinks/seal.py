@@ -21,7 +21,7 @@ import json
 import os
 import struct
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -63,6 +63,7 @@ class SealReport(NamedTuple):
     messages: int
     wall_s: float
     fates: Mapping[tuple[int, int, str, bool], int]  # how many copies: direction, fate, cause, whether a further one
+    answers_ns: Sequence[int]  # from SAMPLE to COMMAND, of every tick whose answer came in time to be measured
 
 
 def seal(run_dir: str | os.PathLike[str]) -> SealReport:
@@ -100,6 +101,7 @@ def seal(run_dir: str | os.PathLike[str]) -> SealReport:
         sealing.run.messages,
         time.perf_counter() - started,
         sealing.run.fates,
+        sealing.timing.answers_ns,
     )
 
 
@@ -134,7 +136,7 @@ class _Target:
 
 
 class _Sealing:
-    """One pass over the journal; memory is bounded by REORDER_TICKS ticks and one chunk."""
+    """One pass over the journal; memory: REORDER_TICKS ticks, one chunk, and 8 bytes for each answer."""
 
     def __init__(self, reader: JournalReader, run_file: IO[bytes], timing_file: IO[bytes]) -> None:
         self._reader = reader

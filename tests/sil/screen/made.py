@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import deque
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from protocol.frames import FRESH, Telemetry
+from sil.answers import RECENT_ANSWERS
 from sil.commands import Acting
 from sil.screen.messages import Plan, Sample, State
 from sil.screen.seen import Seen
@@ -59,7 +61,7 @@ def rig(board: bool = True, paced: bool = False) -> Any:
         loop=loop, clock=clock, answers=None, port=None, window=None, session=None, orders=None, plugged=("none", "")
     )
     if board:
-        made.answers = SimpleNamespace(telemetry=None, answer_ns=[], strays=0)
+        made.answers = SimpleNamespace(telemetry=None, answer_ns=deque(maxlen=RECENT_ANSWERS), answered=0, strays=0)
         made.plugged = ("process", "pty")
     return made
 
@@ -78,3 +80,9 @@ class SimpleList(list[int]):
 
     def tolist(self) -> list[int]:
         return list(self)
+
+
+def answered(rig: Any, answer_ns: int) -> None:
+    """The board answered in time."""
+    rig.answers.answered += 1
+    rig.answers.answer_ns.append(answer_ns)

@@ -38,12 +38,17 @@ def test_what_was_not_told_is_told_next_time() -> None:
     reader = Reader(load_scenario("mrac-rs232"), rig, "set-point")
     reader.take(0, made.motion(0))
     rig.loop.lateness_ns += [1, 2]
+    for answer_ns in (3, 4):
+        made.answered(rig, answer_ns)
     reader.event(0, 0x0101, 0, 1, 0)
     first, again = reader.state(0, made.motion(0)), reader.state(0, made.motion(0))
-    assert first.late_ns == again.late_ns == [1, 2] and len(again.events) == len(again.samples) == 1
+    assert first.late_ns == again.late_ns == [1, 2] and first.answer_ns == again.answer_ns == [3, 4]
+    assert len(again.events) == len(again.samples) == 1
     reader.told()
     after = reader.state(0, made.motion(0))
-    assert (after.late_ns, after.events, after.samples) == ([], [], [])
+    assert (after.late_ns, after.answer_ns, after.events, after.samples) == ([], [], [], [])
+    made.answered(rig, 5)
+    assert reader.state(0, made.motion(0)).answer_ns == [5]
 
 
 def test_a_screen_that_is_never_told_costs_bounded_memory() -> None:
@@ -56,9 +61,10 @@ def test_a_screen_that_is_never_told_costs_bounded_memory() -> None:
         reader.take(k, made.motion(k)._replace(euler_rad=np.full(3, -k / 7e5)))
         reader.event(k, 0x0101, -k, k, 0)
         rig.loop.lateness_ns.append(1_000_000_000 + k)
-        rig.answers.answer_ns.append(1_000_000_000 + k)
+        made.answered(rig, 1_000_000_000 + k)
     state = reader.state(last, made.motion(last))
-    assert len(state.events) == len(state.late_ns) == MOST_NEW and state.late_ns[-1] == 1_000_000_000 + last - 1
+    assert len(state.events) == len(state.late_ns) == len(state.answer_ns) == MOST_NEW
+    assert state.late_ns[-1] == state.answer_ns[-1] == 1_000_000_000 + last - 1
     assert len(state.samples) == 2 * SAMPLES
     ours, theirs = queue()
     with ours, theirs:
