@@ -259,7 +259,8 @@ def next_run_dir(parent: Path, name: str) -> Path:
 def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealReport) -> dict[str, Any]:
     run = open_run(folder)
     metrics = measure(run)
-    link = _link_counters(outcome.rig, metrics)
+    ways = fates(report.fates)
+    link = _link_counters(outcome.rig, metrics, sum(way["corrupted"] for way in ways.values()))
     metrics |= {"crc_errors": link["crc_errors"], "discarded_bytes": link["discarded_bytes"]}
     judgements = judge(scenario.require, metrics) if outcome.reason in ("finished", "diverged") else []
     timing = _timing(scenario, outcome, report)
@@ -279,7 +280,7 @@ def _summary(scenario: Scenario, folder: Path, outcome: Outcome, report: SealRep
         "not_a_number": not_a_number,
         "restarted_at_ticks": [event.tick for event in run.events if event.code == events.BOARD_RESTARTED],
         "link": link,
-        "fates": fates(report.fates),
+        "fates": ways,
         "timing": timing,
         "reproducible": not link["real_misses"] and not link["restarts"],
         "sha256": report.sha256,
@@ -302,8 +303,11 @@ def _verdict(outcome: Outcome, judgements: list[Judgement], degraded: bool, not_
     return EXIT_OK, "passed"
 
 
-def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int]:
-    """From the log what is in the log; real misses, CRC errors and discarded bytes belong to this host's link."""
+def _link_counters(rig: Rig | None, metrics: Mapping[str, Any], corrupted: int) -> dict[str, int]:
+    """From the log what is in the log: `corrupted` are frames that the modelled link altered, both ways.
+
+    Real misses, CRC errors, discarded bytes and the rest belong to this host and its link, at the laboratory's end.
+    """
     counters = rig.port.counters if rig is not None and rig.port is not None else None
     return {
         "missed": metrics["missed"],
@@ -311,6 +315,7 @@ def _link_counters(rig: Rig | None, metrics: Mapping[str, Any]) -> dict[str, int
         "real_misses": rig.window.real_misses if rig is not None and rig.window is not None else 0,
         "overruns": metrics["overruns"],
         "restarts": metrics["restarts"],
+        "corrupted": corrupted,
         **{name: getattr(counters, name, 0) for name in PORT_COUNTERS},
         "strays": rig.answers.strays if rig is not None and rig.answers is not None else 0,
     }
@@ -331,7 +336,7 @@ def _timing(scenario: Scenario, outcome: Outcome, report: SealReport) -> dict[st
         "seal_s": report.wall_s,
         "times_real_time": simulated_s / outcome.wall_s if outcome.wall_s > 0 else 0.0,
         **wakes,
-        "answer_us": lateness.percentiles_us(rig.answers.answer_ns if rig and rig.answers else []),
+        "answer_us": lateness.percentiles_us(report.answers_ns),
         "degraded": too_many or outcome.suspended_s > 0,
         "rebased_ticks": loop.rebased_ticks if loop is not None else 0,
         "slipped_s": loop.slipped_ns * 1e-9 if loop is not None else 0.0,

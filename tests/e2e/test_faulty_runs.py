@@ -17,7 +17,9 @@ from sil.report.info import info, text
 from sil.rig import channel_of
 from sil.runner import run_scenario
 from sil.scenario import load_scenario
+from sil.screen.reading import Reader
 from sil.sinks.journal import Fate
+from sil.watch import Watch
 
 FAULTS = [
     "link.faults.drop=0.08",
@@ -138,6 +140,26 @@ def test_every_frame_of_the_log_has_one_fate_and_its_cause(recorded):
         assert counts["copies"] == sum(row.direction == way and row.copy > 0 for row in packets)
         assert counts["causes"]["dropped"]["drop"] == sum(row.cause == "drop" for row in own)
     assert ways["up"]["frames"] == 1 + 200  # CONFIG, and a SAMPLE each tick
+
+
+def test_the_summary_counts_what_the_model_corrupts_apart_from_what_the_real_link_does(recorded, tmp_path):
+    """A user who asks for bit errors and reads `crc errors 0` alone would think that there were none."""
+    own = [row for row in open_run(recorded[0]).packets if row.fate == "corrupted" and not row.copy]
+    assert {row.direction for row in own} == {"up", "down"}
+    for link in (recorded[1]["link"], fly(tmp_path / "run", "link.url=pty")["link"]):
+        assert link["corrupted"] == len(own)
+        assert (link["crc_errors"], link["discarded_bytes"]) == (0, 0)
+
+
+def test_the_live_view_counts_them_too(tmp_path):
+    class Onlooker(Watch):
+        def plugged(self, scenario, rig):
+            self.reader = Reader(scenario, rig, "reference")
+
+    onlooker = Onlooker()
+    scenario = load_scenario("appc-rs232", [*FAULTS, "duration_s=100", "board=inproc", "link.url=inproc"])
+    summary = run_scenario(scenario, tmp_path / "run", onlooker)
+    assert onlooker.reader.counters()["corrupted"] == summary["link"]["corrupted"] > 0
 
 
 def test_altered_bytes_stand_in_the_log_and_nowhere_else(recorded):
