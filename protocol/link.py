@@ -27,6 +27,7 @@ class Link(ABC):
     datagram: bool = False
     url: str = ""
     strangers: int = 0  # datagrams from somebody else, dropped
+    refused: int | None = None  # how often the network said that nobody listens at the other end; None: it never would
 
     @property
     def peer_url(self) -> str:

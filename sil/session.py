@@ -19,6 +19,7 @@ CONFIG_EVERY_S = 2.0
 TELL_EVERY_S = 10.0
 READY_WITHIN_S = 300.0  # a law may take its time to compile on a slow machine; nobody compiles for longer
 RESTARTS = 3
+SOMEBODY_S = 3.0  # without a refusal by the network: somebody listens (a remote machine refuses once a second)
 BUILD = "sil 0.1"
 OTHER_VERSION = "take both from the same version; the C firmware is built anew with `make firmware`"
 
@@ -112,6 +113,7 @@ class Opening:
         self._began_s = time.monotonic()
         self._due_s = 0.0  # when HELLO or CONFIG is sent again; 0: now, for the first time
         self._tell_s = 0.0
+        self._refused, self._refused_s = self._port.link.refused, self._began_s
 
     def poll(self) -> float:
         """Send what is due, HELLO or CONFIG; returns for how many seconds nothing else will be. Raises LinkFailure."""
@@ -138,10 +140,18 @@ class Opening:
     def _greet(self, now: float) -> None:
         if self._due_s:
             self._check_alive()
+            if self._port.link.refused != self._refused:
+                self._refused, self._refused_s = self._port.link.refused, now
             if now > self._began_s + self._within_s:
-                raise LinkFailure(f"board: no HELLO within {self._within_s:g} s: is it running and on this link?")
+                raise LinkFailure(f"board: no HELLO within {self._within_s:g} s{self._why_silent(now)}")
         self._port.send(self._hello)
         self._due_s = now + HELLO_EVERY_S
+
+    def _why_silent(self, now: float) -> str:
+        """A board that another laboratory flies is silent (SPEC 4), but the network knows that its port is open."""
+        if self._refused is None or now < self._refused_s + min(SOMEBODY_S, 0.5 * self._within_s):
+            return ": is it running and on this link?"
+        return ", though somebody listens there: has another laboratory taken the board, or does it hang?"
 
     def _is_echo(self, hello: Hello) -> bool:
         ours = hello.role == frames.ROLE_BOARD and hello.nonce == self._hello.nonce

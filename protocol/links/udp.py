@@ -30,7 +30,7 @@ class UdpLink(Link):
         self._name = name
         self._waiter = Waiter(sock.fileno() if wait_for is None else wait_for)
         self.strangers = 0
-        self.refused = 0  # "nobody listens there", as the network told us
+        self.refused: int = 0
 
     @classmethod
     def open(cls, url: str, listen: bool) -> UdpLink:

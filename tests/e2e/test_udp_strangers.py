@@ -206,7 +206,7 @@ def test_a_second_laboratory_is_refused_and_counted(cli, serving):
     before = port.counters.strangers
     with UdpLab("127.0.0.1", link.port) as second:
         talk = Session(Port(second), 0, lambda: None)
-        with pytest.raises(LinkFailure, match=re.escape("no HELLO within 1 s")):
+        with pytest.raises(LinkFailure, match="no HELLO within 1 s, though somebody listens there: has another lab"):
             talk.open(made.words, made.configuration.hash, 1.0, lambda line: None)
         assert port.counters.strangers - before >= 5  # a HELLO every 0.2 s
         out, err = run.communicate(timeout=60)
@@ -214,3 +214,14 @@ def test_a_second_laboratory_is_refused_and_counted(cli, serving):
         assert json.loads(out)["ticks"] == 80
         assert talk.open(made.words, made.configuration.hash, 10.0, lambda line: None)
         talk.close(frames.STOP_DONE)
+
+
+def test_where_nobody_listens_no_other_laboratory_is_blamed():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    made = orders(load_scenario("appc-udp"))
+    with UdpLab("127.0.0.1", port) as link:
+        talk = Session(Port(link), 0, lambda: None)
+        with pytest.raises(LinkFailure, match=re.escape("no HELLO within 1 s: is it running and on this link?")):
+            talk.open(made.words, made.configuration.hash, 1.0, lambda line: None)
