@@ -11,6 +11,7 @@ FORM_FIXED, FORM_FLOAT = 0, 1
 REFERENCE_NONE, REFERENCE_ZOH, REFERENCE_PAPER = 0, 1, 2
 STALE_PROPAGATE, STALE_REUSE = 0, 1
 SEQUENCE_321, SEQUENCE_123 = 0, 1
+ERROR_EULER, ERROR_QUATERNION = 0, 1
 USER_LAW_ID = 0xFFFF
 READ_EULER, READ_QUATERNION, READ_RATE = 1, 2, 4  # bits of readings_mask
 AXES = ("x", "y", "z")
@@ -65,6 +66,12 @@ def vector(name: str, unit: str, q: int | str, low: float, high: float, default:
 def flag(name: str, default: int, about: str) -> Word:
     """A word that is off or on."""
     return Word(name, "", 0, 0, 1, default, about, ("off", "on"))
+
+
+def error_word(default: int) -> Word:
+    """What a law takes for its attitude error (firmware_sim/controllers/attitude_error.py)."""
+    about = "attitude error: difference of the Euler angles, or in body axes"
+    return Word("error", "", 0, 0, 1, default, about, ("euler", "quaternion"))
 
 
 INERTIA_WORDS = vector(

@@ -1,6 +1,7 @@
 /* The law pd, fixed form; firmware_sim/controllers/pd.py has the same functions and the equations. */
 #include "pd.h"
 
+#include "attitude_error.h"
 #include "fixed.h"
 #include "generated/frames.h"
 #include "generated/law_tables.h"
@@ -27,28 +28,51 @@ static void per_sample(int32_t gain, int32_t bits, int32_t period_us, int32_t *m
 static bool pd_init(void *memory, const int32_t *common, const int32_t *params) {
     pd *self = memory;
     pd_par *par = &self->par;
+    const int32_t bits = params[PD_KD_BITS] + common[COMMON_RATE_BITS] - 28; /* of kd times a sensed rate beyond Q28 */
     *self = (pd){0};
     for (int i = 0; i < 3; i++) {
         par->kp[i] = params[PD_KP_X + i];
-        per_sample(params[PD_KD_X + i], params[PD_KD_BITS], common[COMMON_PERIOD_US], &par->kd[i], &par->kd_shift[i]);
+        if (params[PD_RATE] == PD_RATE_SENSED) {
+            par->kd[i] = params[PD_KD_X + i];
+            par->kd_shift[i] = bits > 0 ? bits : 0;
+        } else {
+            per_sample(params[PD_KD_X + i], params[PD_KD_BITS], common[COMMON_PERIOD_US], &par->kd[i],
+                       &par->kd_shift[i]);
+        }
     }
     torque_limits(common, par->limit);
     par->kp_shift = params[PD_KP_BITS] + 1;
     par->torque_shift = common[COMMON_TORQUE_BITS] - 28;
+    par->rate_shift = bits < 0 ? bits : 0;
+    par->sensed = params[PD_RATE];
+    par->kind = params[PD_ERROR];
+    par->sequence = common[COMMON_ATTITUDE_SEQUENCE];
     return true;
 }
 
-/* The command of axis i from a reading. */
-static void control(pd *self, const law_input *in, const reference *ref, int i, law_output *out) {
+/* Error, rad Q29; for TELEMETRY in bam; and rate. */
+static void take_reading(pd *self, const law_input *in, const reference *ref, int32_t error[3]) {
     const pd_par *par = &self->par;
     pd_state *s = &self->state;
-    if (s->gap > 0) {
-        int64_t change = mul_q(wrap32(wide(in->euler[i]) - s->reading[i]), TWO_PI_Q28, 31);
-        s->change[i] = (int32_t)div_trunc(change, s->gap);
+    int32_t change[3];
+    attitude_error(par->kind, par->sequence, ref->state.now, in->euler, error);
+    attitude_error(par->kind, par->sequence, in->euler, s->reading, change);
+    for (int i = 0; i < 3; i++) {
+        if (par->sensed != 0) {
+            s->change[i] = sat32(shift_round(in->rate[i], par->rate_shift));
+        } else if (s->gap > 0) {
+            s->change[i] = (int32_t)div_trunc(change[i], s->gap);
+        }
+        s->reading[i] = in->euler[i];
+        s->error[i] = wrap32(par->kind == ERROR_EULER ? wide(ref->state.now[i]) - in->euler[i]
+                                                      : mul_q(error[i], INV_TWO_PI_Q34, 31));
     }
-    s->reading[i] = in->euler[i];
-    s->error[i] = wrap32(wide(ref->state.now[i]) - in->euler[i]);
-    int64_t error = mul_q(s->error[i], TWO_PI_Q28, 31);
+}
+
+/* The command of axis i. */
+static void control(pd *self, int i, int32_t error, law_output *out) {
+    const pd_par *par = &self->par;
+    pd_state *s = &self->state;
     int64_t wanted = mul_q(par->kp[i], error, par->kp_shift) - mul_q(par->kd[i], s->change[i], par->kd_shift[i]);
     int32_t u = keep32(wanted, &s->arithmetic);
     s->command[i] = (int32_t)clip(u, -par->limit[i], par->limit[i]);
@@ -60,11 +84,15 @@ static void control(pd *self, const law_input *in, const reference *ref, int i, 
 static void pd_step(void *memory, const law_input *in, reference *ref, law_output *out) {
     pd *self = memory;
     pd_state *s = &self->state;
+    int32_t error[3];
     s->arithmetic = 0;
     out->flags = s->gap == 0 && in->fresh == 0 ? FLAG_STARTING : 0;
+    if (in->fresh != 0) {
+        take_reading(self, in, ref, error);
+    }
     for (int i = 0; i < 3; i++) {
         if (in->fresh != 0) {
-            control(self, in, ref, i, out);
+            control(self, i, error[i], out);
         }
         out->torque[i] = sat32(shift_round(s->command[i], -self->par.torque_shift));
     }

@@ -18,7 +18,7 @@ LAWS: dict[str, str] = {
     "appc": "firmware_sim.controllers.appc:Appc",
 }
 # Files of this folder that are not laws.
-SUPPORT = ("compiled", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")
+SUPPORT = ("attitude_error", "compiled", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")
 
 
 class Law(Protocol):

@@ -16,12 +16,17 @@ from firmware_sim.controllers import LAWS, SUPPORT, LawRefuses, inputs, new_law
 from firmware_sim.controllers.compiled import CompiledLaw
 from firmware_sim.guidance.reference import Reference
 from protocol.frames import MAX_TELEMETRY_WORDS
-from protocol.law_tables import TELEMETRY_COMMON, config_words, law_by_name, parse_configuration, refusal
+from protocol.law_tables import COMMON, TELEMETRY_COMMON, config_words, law_by_name, parse_configuration, refusal
 from protocol.laws import IN_C
 
 FORMS = ("fixed", "float")
 FOLDER = Path(firmware_sim.controllers.__file__).parent
-VARIANTS = {"mrac": ({}, {"decouple": 1}, {"design": "printed"}), "appc": ({}, {"gyro": 1}, {"adapt": 0}), "pd": ({},)}
+BODY = {"error": "quaternion", "attitude_sequence": "123"}
+VARIANTS = {
+    "pd": ({}, {"rate": "sensed"}, BODY),
+    "mrac": ({}, {"decouple": 1}, {"design": "printed"}),
+    "appc": ({}, {"gyro": 1}, {"adapt": 0}),
+}
 EACH = [(name, form, values) for name in LAWS for form in FORMS for values in VARIANTS.get(name, ({},))]
 each = pytest.mark.parametrize(("name", "form", "values"), EACH, ids=lambda value: str(value))
 
@@ -55,6 +60,7 @@ def flight(ticks: int, seed: int, loss: float = 0.05) -> np.ndarray:
         period, phase = rng.uniform(60, 300), rng.uniform(0, 6)
         turn = rng.uniform(0.05, 0.2) * np.sin(2 * math.pi * t / period + phase) + rng.normal(0, 5e-5, ticks)
         wire[:, 3 + axis] = np.round(turn * 2**32)
+        wire[:, 10 + axis] = np.round(np.gradient(turn) * 4 * math.pi * 2**28)
         wire[:, 19 + axis] = np.round(np.repeat(rng.uniform(-0.2, 0.2, ticks // 100 + 1), 100)[:ticks] * 2**32)
         wire[:, 13 + axis] = np.round(rng.uniform(-0.1, 0.1, ticks) * 2**30)
         wire[:, 16 + axis] = np.round(0.2 * np.sin(t / 50) * 2**28)
@@ -191,7 +197,10 @@ def test_what_a_law_cannot_fly_it_refuses(name: str, form: str) -> None:
         if not allowed:
             with pytest.raises(LawRefuses, match="transport_delay_ticks"):
                 new_law(name, parse_configuration(words))
-    for period_s in (table.period_s[0] * 0.5, table.period_s[1] * 2):
+    shortest = next(word.minimum for word in COMMON if word.name == "period_us")
+    for period_s in (max(table.period_s[0] * 0.5, shortest * 1e-6), table.period_s[1] * 2):
+        if period_s == table.period_s[0]:
+            continue  # no CONFIG can ask for less
         configuration = parse_configuration(config_words(table, {"form": form, "period_us": round(period_s * 1e6)}))
         with pytest.raises(LawRefuses, match="period_s"):
             new_law(name, configuration)

@@ -45,11 +45,15 @@ typedef struct {
     int32_t kp_shift;     /* bit */
     int32_t kd_shift[3];  /* bit */
     int32_t torque_shift; /* bit */
+    int32_t rate_shift;   /* bit */
+    int32_t sensed;
+    int32_t kind;
+    int32_t sequence;
 } pd_par;
 
 typedef struct {
     int32_t reading[3]; /* turn Q32 */
-    int32_t change[3];  /* rad/sample Q29 */
+    int32_t change[3];  /* rad/sample Q29, or rad/s as sensed */
     int32_t command[3]; /* N m Q28 */
     int32_t error[3];   /* turn Q32 */
     int32_t gap;        /* tick */
@@ -156,7 +160,7 @@ typedef struct appc {
 } appc;
 
 _Static_assert(sizeof(reference) == 184, "padding in reference");
-_Static_assert(sizeof(pd) == 112, "padding in pd");
+_Static_assert(sizeof(pd) == 128, "padding in pd");
 _Static_assert(sizeof(mrac) == 672, "padding in mrac");
 _Static_assert(sizeof(appc) == 352, "padding in appc");
 

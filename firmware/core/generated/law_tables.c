@@ -46,6 +46,8 @@ static const word_range PD_RANGES[PD_WORDS] = {
     {INT32_MIN, INT32_MAX, 2}, /* kd_x */
     {INT32_MIN, INT32_MAX, 2}, /* kd_y */
     {INT32_MIN, INT32_MAX, 2}, /* kd_z */
+    {0, 1, NO_WORD}, /* rate */
+    {0, 1, NO_WORD}, /* error */
 };
 
 static const word_range MRAC_RANGES[MRAC_WORDS] = {
@@ -80,7 +82,7 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
 };
 
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
-    {1, 1, 0x28D41CC3, PD_RANGES, 5000, 10000000, {{0x1F, 0x06, 1}}, PD_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* pd */
+    {1, 2, 0x72A0703C, PD_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}, {0x1F, 0x06, 5}}, PD_WORDS, 8, NO_WORD, NO_WORD}, /* pd */
     {2, 1, 0x5C9EFFBA, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02, 1}, {0x02, 0x04, 1}}, MRAC_WORDS, 0, 4, 32}, /* mrac */
     {3, 1, 0x2A4D5A9F, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
 };

@@ -6,7 +6,7 @@
 #include <stdint.h>
 
 /* The built-in laws. */
-enum { PD_LAW_ID = 1, PD_LAW_VERSION = 1 };
+enum { PD_LAW_ID = 1, PD_LAW_VERSION = 2 };
 enum { MRAC_LAW_ID = 2, MRAC_LAW_VERSION = 1 };
 enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 1 };
 
@@ -51,7 +51,9 @@ enum {
     PD_KD_X = 5,       /* 2^-kd_bits N m s/rad: rate gain, x */
     PD_KD_Y = 6,       /* 2^-kd_bits N m s/rad: rate gain, y */
     PD_KD_Z = 7,       /* 2^-kd_bits N m s/rad: rate gain, z */
-    PD_WORDS = 8
+    PD_RATE = 8,       /* what kd acts on: change of the reading, or the rate sensor */
+    PD_ERROR = 9,      /* attitude error: difference of the Euler angles, or in body axes */
+    PD_WORDS = 10
 };
 
 /* CONFIG words of mrac, from the law's first. */
@@ -109,9 +111,9 @@ enum {
 
 /* TELEMETRY words of pd, from the law's first. */
 enum {
-    PD_TELEMETRY_ERROR_X = 0,    /* 2^-32 turn: ym(k) - y(k), x */
-    PD_TELEMETRY_ERROR_Y = 1,    /* 2^-32 turn: ym(k) - y(k), y */
-    PD_TELEMETRY_ERROR_Z = 2,    /* 2^-32 turn: ym(k) - y(k), z */
+    PD_TELEMETRY_ERROR_X = 0,    /* 2^-32 turn: ym(k) - y(k), or what error says, x */
+    PD_TELEMETRY_ERROR_Y = 1,    /* 2^-32 turn: ym(k) - y(k), or what error says, y */
+    PD_TELEMETRY_ERROR_Z = 2,    /* 2^-32 turn: ym(k) - y(k), or what error says, z */
     PD_TELEMETRY_WORDS = 3
 };
 
@@ -161,6 +163,8 @@ enum { COMMON_REFERENCE_KIND_NONE = 0, COMMON_REFERENCE_KIND_ZOH = 1, COMMON_REF
 enum { COMMON_SETPOINT_SOURCE_TABLE = 0, COMMON_SETPOINT_SOURCE_SAMPLE = 1 };
 enum { COMMON_STALE_PROPAGATE = 0, COMMON_STALE_REUSE = 1 };
 enum { COMMON_ATTITUDE_SEQUENCE_321 = 0, COMMON_ATTITUDE_SEQUENCE_123 = 1 };
+enum { PD_RATE_DIFFERENCE = 0, PD_RATE_SENSED = 1 };
+enum { PD_ERROR_EULER = 0, PD_ERROR_QUATERNION = 1 };
 enum { MRAC_DESIGN_PRINTED = 0, MRAC_DESIGN_REPAIRED = 1 };
 enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };

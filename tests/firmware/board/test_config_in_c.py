@@ -125,7 +125,7 @@ def test_any_parts(c_board: CBoard, seed: int) -> None:
     ("index", "value", "status", "told"),
     [
         (2, 1, frames.READY_LAW_REFUSES, frames.NO_INDEX),  # float
-        (1, 2, frames.READY_UNKNOWN_LAW, 0),
+        (1, 99, frames.READY_UNKNOWN_LAW, 0),
         (0, 0xFFFF, frames.READY_UNKNOWN_LAW, 0),  # a user's law
         (23, -1, frames.READY_MISSING_PARTS, frames.NO_INDEX),
         (24, -5000, frames.READY_BAD_WORD, 24),
@@ -163,7 +163,7 @@ def test_a_board_with_less_room_says_that_it_has_none(build_folder: Path) -> Non
     words = config_words(TABLES[0], {}, [(tick, 0, 0, 0) for tick in range(30)])
     bad = [*words[:3], 5, *words[4:]]
     for given_words, expected in (
-        (words[:23] + (2,) + words[24:42], Ready(frames.READY_OK, frames.NO_INDEX, 0)),
+        (words[:23] + (2,) + words[24 : -28 * ROW_WORDS], Ready(frames.READY_OK, frames.NO_INDEX, 0)),
         (words, REFUSED),
         (bad, Ready(frames.READY_BAD_WORD, 3, 0)),
         (words[:-4], Ready(frames.READY_MISSING_PARTS, frames.NO_INDEX, 0)),

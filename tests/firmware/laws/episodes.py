@@ -127,7 +127,14 @@ def _pd(rng: np.random.Generator) -> dict[str, Any]:
     gains = {"kp": (inertia * wn * wn).tolist(), "kd": (inertia * 2 * rng.uniform(0.5, 1.2) * wn).tolist()}
     if rng.random() < 0.1:
         gains = {name: (10.0 ** rng.uniform(-6, 6, 3) * rng.choice([-1, 1], 3)).tolist() for name in gains}
-    return {**_common(rng, period), **gains, "reference_lead": int(rng.integers(1, 3))}
+    return {**_common(rng, period), **gains, "reference_lead": int(rng.integers(1, 3)), **_readings(rng),
+            "rate": int(rng.random() < 0.4)}  # fmt: skip
+
+
+def _readings(rng: np.random.Generator) -> dict[str, Any]:
+    """Which error, of which angles, and the scale of the rates."""
+    error, sequence = int(rng.random() < 0.5), int(rng.random() < 0.5)
+    return {"error": error, "attitude_sequence": sequence, "rate_bits": int(rng.integers(8, 29))}
 
 
 def _mrac(rng: np.random.Generator) -> dict[str, Any]:
@@ -222,6 +229,7 @@ class Satellite:
         self._turns = self._period**2 / 2 / math.pi / (np.array(belief) * rng.uniform(0.85, 1.2, 3))
         self._lsb = 2.0 ** -common["torque_bits"]
         self._momentum_lsb = 2.0 ** -common["momentum_bits"]
+        self._rate_lsb = 2.0 ** -common["rate_bits"]
         self._angle = rng.uniform(-1, 1, 3) * rng.choice(
             [0.001, 0.003, 0.01, 0.03, 0.5], p=[0.3, 0.3, 0.2, 0.15, 0.05]
         )  # turns
@@ -242,6 +250,8 @@ class Satellite:
             return
         turns = self._angle + self._noise[k]
         inp[k, inputs.EULER] = np.rint((turns - np.rint(turns)) * 2.0**32).astype(np.int64).astype(np.int32)
+        rate = self._rate * 2.0 * math.pi / self._period / self._rate_lsb
+        inp[k, inputs.RATE] = np.clip(np.rint(rate), -(2**31), 2**31 - 1)
         inp[k, inputs.APPLIED] = np.clip(self._acting / self._lsb, -(2**31), 2**31 - 1)
         inp[k, inputs.MOMENTUM] = np.clip(self._momentum / self._momentum_lsb, -(2**31), 2**31 - 1)
 

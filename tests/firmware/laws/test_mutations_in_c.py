@@ -36,7 +36,9 @@ MUTATIONS = {
     "identification one tick early": ("mrac.c", "s->steps >= 3", "s->steps >= 2", ("mrac",)),
     "covariance not mirrored": ("rls.c", "F[5 * m + n] = F[5 * n + m] =", "F[5 * m + n] =", ("mrac",)),
     "a loss forgotten": ("appc.c", "in->good_run >= smaller(3, s->steps + 1)", "1", ("appc",)),
-    "the derivative not over the gap": ("pd.c", "div_trunc(change, s->gap)", "change", ("pd",)),
+    "the derivative not over the gap": ("pd.c", "div_trunc(change[i], s->gap)", "change[i]", ("pd",)),
+    "half a turn the long way": ("attitude_error.c", "w >= 0 ? z : -z", "z", ("pd",)),
+    "angles of the other sequence": ("attitude_error.c", "sequence != COMMON", "sequence == COMMON", ("pd",)),
     "the reference of the other lead": ("reference.c", "s->lead == 2", "s->lead != 2", IN_C),
 }
 
@@ -60,7 +62,7 @@ def test_an_edit_of_the_c_is_seen(name: str, recorded: dict[str, list[Episode]],
 @pytest.mark.parametrize(
     ("file", "before", "after"),
     [
-        ("pd.c", "wide(in->euler[i]) - s->reading[i]", "in->euler[i] - s->reading[i]"),
+        ("pd.c", "wide(ref->state.now[i]) - in->euler[i]", "ref->state.now[i] - in->euler[i]"),
         ("reference.c", "wide(in->setpoint[i]) - in->euler[i]", "in->setpoint[i] - in->euler[i]"),
         ("fixed.h", "(int64_t)((uint64_t)x << -n)", "x << -n"),
     ],

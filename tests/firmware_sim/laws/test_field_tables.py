@@ -17,7 +17,12 @@ from tools.c_states import STRUCTS, c_dtype, c_order, c_size
 
 TABLES = [(name, table) for name, (_, par, state) in STRUCTS.items() for table in (par, state)]
 CORNERS = {
-    "pd": [{"period_us": 5000, "kd": 1e6, "kp": -1e6}, {"period_us": 10_000_000, "kd": 1e-9, "torque_bits": 8}],
+    "pd": [
+        {"period_us": 1000, "kd": 1e6, "kp": -1e6},
+        {"period_us": 10_000_000, "kd": 1e-9, "torque_bits": 8},
+        {"rate": 1, "kd": 1e6, "rate_bits": 8, "error": 1},
+        {"rate": 1, "kd": 1e-9, "rate_bits": 30},
+    ],
     "mrac": [
         {"period_us": 200_000, "inertia_kgm2": 30.0, "forgetting": 0.9, "c2_pole": 0.999, "kappa": 0},
         {"period_us": 1_000_000, "inertia_kgm2": 0.126, "kappa": 1, "trace_max": 2000, "torque_bits": 8},
