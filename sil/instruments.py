@@ -18,7 +18,7 @@ from sil.scenario import Scenario
 from sil.scenario_instruments import Fault
 from sil.sensors import SENSORS
 from sil.sensors import faults as sensor_faults
-from sil.sensors.sampled import Instants, Sampled
+from sil.sensors.sampled import Instants, Sampled, instants
 from sil.signals import Actuator, Sensor
 
 
@@ -44,7 +44,7 @@ def sensors_of(scenario: Scenario) -> Instruments:
 def instants_of(scenario: Scenario, name: str) -> Instants:
     """When the sensor `name` looks."""
     consumer = f"sensors.{name}.sampling"
-    return Instants(scenario.sensors.times_of(name), scenario.period_us, scenario.seed, consumer)
+    return instants(scenario.sensors.times_of(name), scenario.period_us, scenario.seed, consumer)
 
 
 def actuator_of(scenario: Scenario) -> Actuator:

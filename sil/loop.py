@@ -186,7 +186,8 @@ class Loop:
         """To t_k+1. Whoever looks in between sees the truth of that very instant, a whole number of microseconds."""
         end_ns = t_ns + self.timing.period_ns
         while (stop_ns := min([end_ns, *[unit.due_ns for unit in self.units]])) < end_ns:
-            self.plant.advance(applied, t_ns, stop_ns - t_ns)
+            if stop_ns > t_ns:
+                self.plant.advance(applied, t_ns, stop_ns - t_ns)
             motion, t_ns = self.plant.motion(stop_ns), stop_ns
             if not is_finite(motion):
                 break  # the next tick says so

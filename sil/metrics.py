@@ -8,7 +8,7 @@ anywhere in its rows makes it NaN, and NaN meets no requirement.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,12 +16,19 @@ import numpy as np
 from protocol import events
 from sil.plain import plain
 from sil.runs import Array, Run, wrapped_deg
+from sil.scenario_metrics import ALL, METRICS, TOTAL
 from sil.sinks.journal import Fate
 
 DIVERGED_deg = 80.0  # the scenario's metrics.diverged_deg says otherwise
+LAST_s = 20.0  # the scenario's metrics.last_s says otherwise
 MISMATCH_LIMIT_deg = 1e-5  # board's reference against ours: 100 times the LSB of an angle on the wire
 SETTLED_FRACTION, SETTLED_FLOOR_deg = 0.02, 0.1  # settled: within 2 % of the step; never asked closer than this
 AXIS_NAMES = ("roll", "pitch", "yaw")
+OF_THREE: dict[str, Callable[[Array], float]] = {
+    "max": np.max,
+    ALL: lambda values: float(np.sqrt(np.mean(np.square(values)))),
+    TOTAL: np.sum,
+}
 PARTS = {"roll": 0, "x": 0, "pitch": 1, "y": 1, "yaw": 2, "z": 2}
 MISMATCH = "reference_mismatch_deg"
 SETTLING, NEVER_SETTLED = "settling_s", "never_settled"
@@ -43,7 +50,8 @@ def measure(run: Run) -> dict[str, Any]:
     """All metrics of a run by name.
 
     Three numbers each: rms_error_deg, rms_setpoint_error_deg, peak_error_deg, peak_torque_Nm, rms_torque_Nm (applied
-    torque on the body), peak_momentum_Nms, effort_Nms (integral of |applied torque| dt), settling_s (see settling_s).
+    torque on the body), peak_momentum_Nms, effort_Nms (integral of |applied torque| dt), settling_s (see settling_s),
+    and residual_error_deg, residual_torque_Nm: rms over the last metrics.last_s (default 20 s) of the run.
     One number: diverged_at_s (first tick with an angle beyond metrics.diverged_deg, default 80 deg, or not a number;
     None: never), reference_mismatch_deg (largest difference between the board's reference and ours; None: the board
     reported none), and the counts missed, late, overruns, restarts.
@@ -55,13 +63,16 @@ def measure(run: Run) -> dict[str, Any]:
     if not np.isfinite(run.reference_deg).any():
         error = run.setpoint_error_deg[rows]  # no reference model in this run: the set-point is the reference
     torque, dwell = run.applied_Nm[rows], dwell_ticks(run)
+    last = max(1, round(float(settings.get("last_s") or LAST_s) / run.period_s))  # rows
     return {
         "from_tick": first,
         "rms_error_deg": _rms(error),
         "rms_setpoint_error_deg": _rms(run.setpoint_error_deg[rows]),
+        "residual_error_deg": _rms(error[-last:]),
         "peak_error_deg": _peak(error),
         "peak_torque_Nm": _peak(torque),
         "rms_torque_Nm": _rms(torque),
+        "residual_torque_Nm": _rms(torque[-last:]),
         "peak_momentum_Nms": _peak(run.momentum_Nms[rows]),
         "effort_Nms": _effort(torque, run.period_s),
         SETTLING: [settling_s(run, axis, first, dwell) for axis in range(3)],
@@ -186,7 +197,8 @@ def judge(require: Iterable[Any], metrics: Mapping[str, Any]) -> list[Judgement]
 
 
 def value_of(metrics: Mapping[str, Any], name: str) -> float | None:
-    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `diverged_at_s`; None: there is none.
+    """One number: `rms_error_deg.roll`, `.max` for the largest of three, `.all` for the rms over the axes too, `.total`
+    for their sum, `diverged_at_s`; None: there is none.
 
     `settling_s.max` is None only if no axis had a step, and infinite if one never settled. metrics: from measure() or
     as they stand in summary.json, where never_settled tells what null means.
@@ -201,11 +213,12 @@ def value_of(metrics: Mapping[str, Any], name: str) -> float | None:
         value = [math.inf if axis in never else number for axis, number in enumerate(value)]
     if not isinstance(value, Sequence | np.ndarray):
         return None if value is None else float(value)
-    if part == "max":
+    if part in OF_THREE and part in (*METRICS.get(key, ()), "max"):
         numbers = [number for number in value if number is not None]  # None: this axis has nothing to measure
-        return float(np.max(numbers)) if numbers else None
+        return float(OF_THREE[part](np.array(numbers))) if numbers else None
     if part not in PARTS:
-        raise ValueError(f"metric: expected {key}.roll, .pitch, .yaw or .max, got {name!r}")
+        known = [f".{each}" for each in METRICS.get(key, ("roll", "pitch", "yaw", "max"))]
+        raise ValueError(f"metric: expected {key}{', '.join(known[:-1])} or {known[-1]}, got {name!r}")
     number = value[PARTS[part]]
     return None if number is None else float(number)
 

@@ -368,7 +368,8 @@ def _misalignment(scenario: Scenario) -> Iterator[Problem]:
 def _sampling(scenario: Scenario) -> Iterator[Problem]:
     sensors = scenario.sensors
     for name in (name for name in SENSORS if getattr(sensors, name).enabled):
-        for path, expected, got in sampling_findings(name, sensors.sampling, getattr(sensors, name).sampling):
+        own = getattr(sensors, name).sampling
+        for path, expected, got in sampling_findings(name, sensors.sampling, own, scenario.period_us):
             yield _problem(scenario, path, expected, got)
 
 

@@ -6,14 +6,17 @@ from sil.scenario_errors import one_of
 
 ANGLES = ("roll", "pitch", "yaw", "max")
 AXES = ("x", "y", "z", "max")
+ALL, TOTAL = "all", "total"  # rms over the three axes as well as over time; sum of the three
 METRICS: dict[str, tuple[str, ...]] = {
-    "rms_error_deg": ANGLES,
-    "rms_setpoint_error_deg": ANGLES,
+    "rms_error_deg": (*ANGLES, ALL),
+    "rms_setpoint_error_deg": (*ANGLES, ALL),
+    "residual_error_deg": (*ANGLES, ALL),
     "peak_error_deg": ANGLES,
-    "rms_torque_Nm": AXES,
+    "rms_torque_Nm": (*AXES, ALL),
+    "residual_torque_Nm": (*AXES, ALL),
     "peak_torque_Nm": AXES,
     "peak_momentum_Nms": AXES,
-    "effort_Nms": AXES,
+    "effort_Nms": (*AXES, TOTAL),
     "settling_s": ANGLES,
     "diverged_at_s": (),
     "reference_mismatch_deg": (),

@@ -27,19 +27,20 @@ class Sampling(Section):
     """When every sensor looks, and how late it tells; a sensor's own `sampling` has the last word, key by key."""
 
     period_s: Time | None = None
-    """Its own sampling period, held in between; null or 0: it looks at t_k, whenever the board is told."""
+    """Its own sampling period, held in between; null or 0: it looks for each tick, at t_k less the delay."""
     delay_s: Time = 0.0
     delay: Kind = "transport"
     """transport: each sample comes delay_s later; unit: a unit-delay block of sample time delay_s behind the sensor."""
     jitter_s: Time = 0.0
-    """Most that a sampling instant is moved, either way; Gaussian, a third of it is the standard deviation."""
+    """Most that a sampling instant is moved, either way, at most half a period; Gaussian, its standard deviation is a
+    third of this."""
 
 
 class OwnSampling(Section):
     """Keys of sensors.sampling for this sensor alone; null: as it says there."""
 
     period_s: Time | None = None
-    """0: it looks at t_k."""
+    """0: it looks for each tick."""
     delay_s: Time | None = None
     delay: Kind | None = None
     """transport or unit."""
@@ -57,7 +58,11 @@ class Times(NamedTuple):
     @property
     def instantaneous(self) -> bool:
         """Nothing but the truth at t_k."""
-        return not (self.period_us or self.delay_us)
+        return not (self.period_us or self.delay_us or self.jitter_s)
+
+    def beat_us(self, tick_us: int) -> int:
+        """From one sample to the next."""
+        return self.period_us or (self.delay_us if self.unit else tick_us)
 
 
 def times_of(sampling: Sampling, own: OwnSampling) -> Times:
@@ -74,8 +79,8 @@ def _value(sampling: Sampling, own: OwnSampling, key: str) -> Any:
 # -- what is wrong with them -------------------------------------------------------------------------------------------
 
 
-def findings(name: str, sampling: Sampling, own: OwnSampling) -> Iterator[Finding]:
-    """What the keys of sensor `name` cannot mean, each at the place that decides it."""
+def findings(name: str, sampling: Sampling, own: OwnSampling, tick_us: int) -> Iterator[Finding]:
+    """What the keys of sensor `name` cannot mean in a run with this period, each at the place that decides it."""
     times = times_of(sampling, own)
     values = {key: _value(sampling, own, key) for key in KEYS}
     paths: dict[str, Path] = {
@@ -89,8 +94,7 @@ def findings(name: str, sampling: Sampling, own: OwnSampling) -> Iterator[Findin
             yield Finding(paths[key], nearest, value)
     if times.unit and not times.delay_us:
         yield Finding(paths["delay_s"], "a number in s above 0 with delay unit", values["delay_s"])
-    if times.jitter_s and not times.period_us:
-        yield Finding(paths["jitter_s"], "0 for a sensor without a period_s of its own", times.jitter_s)
-    elif times.jitter_s and times.jitter_s >= times.period_us * 0.5e-6:
-        half = f"a number in s below half of period_s ({times.period_us * 0.5e-6:g})"
-        yield Finding(paths["jitter_s"], half, times.jitter_s)
+    beat_s = times.beat_us(tick_us) * 1e-6
+    if times.jitter_s > 0.5 * beat_s > 0:
+        whose = "period_s" if times.period_us else "delay_s" if times.unit else "the run's period"
+        yield Finding(paths["jitter_s"], f"a number in s, at most half of {whose} ({0.5 * beat_s:g})", times.jitter_s)

@@ -352,6 +352,8 @@ class Metrics(Section):
     """What counts."""
 
     from_tick: Count = 0
+    last_s: Positive = 20.0
+    """How much of the end of the run the residual_ metrics look at."""
     diverged_deg: Positive | None = 80.0
     """An attitude angle beyond this is a divergence (metric diverged_at_s); null: no such limit."""
 

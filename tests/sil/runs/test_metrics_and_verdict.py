@@ -265,6 +265,23 @@ def test_effort_is_the_integral_of_the_torque_that_acted(run: Run) -> None:
     assert run.applied_Nm[20:].min() < 0  # else a plain sum would do
 
 
+def test_residual_looks_at_the_end_of_the_run_only(run: Run) -> None:
+    """rms over the last metrics.last_s, by default 20 s: what is left when all transients are over."""
+    metrics = measure(run)
+    assert metrics["residual_error_deg"] == pytest.approx(np.sqrt((run.error_deg[-40:] ** 2).mean(axis=0)).tolist())
+    assert metrics["residual_torque_Nm"] == pytest.approx(np.sqrt((run.applied_Nm[-40:] ** 2).mean(axis=0)).tolist())
+    assert metrics["residual_error_deg"] != metrics["rms_error_deg"]
+
+
+def test_three_axes_in_one_number() -> None:
+    metrics = {"rms_error_deg": [1.0, 2.0, 2.0], "effort_Nms": [0.5, 0.25, 0.125]}
+    assert value_of(metrics, "rms_error_deg.all") == math.sqrt(3.0)  # sqrt of the mean of 1, 4, 4
+    assert value_of(metrics, "effort_Nms.total") == 0.875
+    assert math.isnan(value_of({"rms_error_deg": [1.0, math.nan, 2.0]}, "rms_error_deg.all") or 0.0)
+    with pytest.raises(ValueError, match=r"expected effort_Nms\.x, \.y, \.z, \.max or \.total, got 'effort_Nms\.all'"):
+        value_of(metrics, "effort_Nms.all")
+
+
 def test_a_requirement_may_name_every_metric(run: Run) -> None:
     """A metric that measure() knows and the scenario refuses could never be required."""
     assert set(measure(run)) - {"from_tick"} <= set(METRIC_NAMES)

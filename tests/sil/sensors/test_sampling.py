@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from protocol.frames import Reading
 from sil.instruments import sensors_of
 from sil.loop import Loop, Scales, Timing
+from sil.noise import Gaussian
 from sil.plants.rigid import Rigid
 from sil.scenario import load_values
 from sil.scenario_sampling import Times
-from sil.sensors.sampled import Instants, Sampled
+from sil.sensors.sampled import Instants, Sampled, instants
 from sil.signals import Motion
 
 
@@ -39,51 +40,49 @@ def flown(unit, tick_us, ticks):
     for k in range(ticks):
         found.append(unit.read(truth(k * tick_us), k))
         while unit.due_ns < (k + 1) * tick_us * 1000:
-            assert unit.due_ns > k * tick_us * 1000, "an instant behind us"
+            assert unit.due_ns >= k * tick_us * 1000, "an instant behind us"
             unit.observe(truth(unit.due_ns // 1000))
     return found
 
 
-def walked(times, tick_us, ticks, jitters_us):
+def walked(times, tick_us, ticks, jitter_us):
     """The same by walking: a sampler, a hold, a delay line or a block that moves every D."""
-    period = times.period_us or (times.delay_us if times.unit else 0)
-    instants = {}  # us -> newest sample number
-    if period:
-        for i in range(ticks * tick_us // period + 3):
-            instants[0 if i == 0 else i * period + jitters_us(i)] = i
-    else:
-        for k in range(ticks + 1):
-            instants[max(0, k * tick_us - times.delay_us)] = k
-    held, line, block_in, block_out = None, {}, None, None
+    period = times.period_us or times.delay_us
+    samples = {max(0, i * period + jitter_us(i)): i for i in range(ticks * tick_us // period + 3)}
+    held, line, block_in, block_out = 0, {}, 0, 0
     for t in range((ticks - 1) * tick_us + 1):
-        if t in instants:
-            held = t
+        held = t if t in samples else held
         line[t] = held
         if times.unit and t % times.delay_us == 0:
             block_out, block_in = block_in, held
-            block_out = 0 if block_out is None else block_out
         if t % tick_us == 0:
-            if times.unit:
-                yield block_out
-            else:
-                yield line[max(0, t - times.delay_us)]
+            yield block_out if times.unit else line[max(0, t - times.delay_us)]
 
 
 @settings(max_examples=300, deadline=None)
 @given(
-    period_us=st.integers(0, 60), delay_us=st.integers(0, 90), unit=st.booleans(), share=st.floats(0, 0.49),
+    period_us=st.integers(0, 60), delay_us=st.integers(0, 90), unit=st.booleans(), share=st.floats(0, 0.5),
     tick_us=st.integers(1, 40), seed=st.integers(0, 5),
 )  # fmt: skip
 def test_as_a_walk_through_time(period_us, delay_us, unit, share, tick_us, seed):
-    times = Times(period_us, delay_us, unit and delay_us > 0, share * period_us * 1e-6)
-    instants = Instants(times, tick_us, seed, "sensors.attitude.sampling")
-    ticks = 40
-    jitters = (lambda i: instants.at_us(i) - i * period_us) if period_us else (lambda i: 0)
-    readings = flown(Sampled(Witness(), instants), tick_us, ticks)
-    assert [reading.values[0] for reading in readings] == list(walked(times, tick_us, ticks, jitters))
-    assert [reading.age_us for reading in readings] == [
-        k * tick_us - reading.values[0] for k, reading in enumerate(readings)
-    ]
+    times = Times(period_us, delay_us, unit and delay_us > 0, 0.0)
+    beat_us = times.beat_us(tick_us)
+    times = times._replace(jitter_s=share * beat_us * 1e-6)
+    when, ticks = instants(times, tick_us, seed, "sensors.attitude.sampling"), 40
+    readings = flown(Sampled(Witness(), when), tick_us, ticks)
+    moved = Gaussian(seed, "sensors.attitude.sampling", share * beat_us / 3, 1)
+    most = times.jitter_s * 1e6
+
+    def jitter_us(i):
+        return round(float(np.clip(moved.at(i)[0], -most, most))) if i else 0
+
+    if times.period_us or times.unit:
+        expected = list(walked(times, tick_us, ticks, jitter_us))
+    else:
+        expected = [min(max(0, k * tick_us - delay_us + jitter_us(k)), k * tick_us) for k in range(ticks)]
+    assert [reading.values[0] for reading in readings] == expected
+    assert [reading.age_us for reading in readings] == [k * tick_us - at_us for k, at_us in enumerate(expected)]
+    assert all(reading.values[1] == 0 for reading, at_us in zip(readings, expected, strict=True) if not at_us)
 
 
 def test_nothing_is_sampled_that_nobody_reads():
@@ -227,16 +226,16 @@ class _Unpaced:
 # -- what cannot be ---------------------------------------------------------------------------------------------------
 
 
-HALF = "a number in s below half of period_s (0.05)"
-NO_PERIOD = "0 for a sensor without a period_s of its own"
+HALF = "a number in s, at most half of"
 MICROSECONDS = "a whole number of microseconds, nearest"
 
 
 @pytest.mark.parametrize(
     ("keys", "key", "expected", "got"),
     [
-        ({"period_s": 0.1, "jitter_s": 0.05}, "jitter_s", HALF, "0.05"),
-        ({"jitter_s": 0.01}, "jitter_s", NO_PERIOD, "0.01"),
+        ({"period_s": 0.1, "jitter_s": 0.051}, "jitter_s", f"{HALF} period_s (0.05)", "0.051"),
+        ({"jitter_s": 0.3}, "jitter_s", f"{HALF} the run's period (0.25)", "0.3"),
+        ({"delay": "unit", "delay_s": 0.1, "jitter_s": 0.06}, "jitter_s", f"{HALF} delay_s (0.05)", "0.06"),
         ({"delay": "unit"}, "delay_s", "a number in s above 0 with delay unit", "0.0"),
         ({"period_s": 1e-7}, "period_s", f"{MICROSECONDS} 0.000000 s", "1e-07"),
         ({"delay_s": 0.1234567}, "delay_s", f"{MICROSECONDS} 0.123457 s", "0.1234567"),
