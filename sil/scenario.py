@@ -46,7 +46,8 @@ from sil.scenarios import is_file
 from sil.sensors import SENSORS
 from sil.timeline import setpoint_rows
 
-NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out")  # how it is run, not what is run
+# How it is run, not what is run.
+NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out", "variants")
 MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
 
 
@@ -103,6 +104,10 @@ class Scenario(Section):
     metrics: Metrics = Metrics()
     require: tuple[Requirement, ...] = ()
     """What decides the verdict."""
+    variants: dict[str, dict[str, Any]] = {}
+    """Name to keys that replace those above, merged as over a scenario that is extended: {pd: {law: {name: pd}}}"""
+    variant: str | None = None
+    """Which of the variants this is, also `--variant`; null: none. The run is called NAME-VARIANT."""
 
     _source: Source = PrivateAttr()
     _table: LawTable = PrivateAttr()
@@ -176,7 +181,9 @@ class Scenario(Section):
 
     def resolved(self) -> dict[str, Any]:
         """Every key with its value, defaults included, in a fixed order; loads again with load_values()."""
-        return self.model_dump(mode="json")
+        values = self.model_dump(mode="json")
+        unsaid = [key for key in ("variant", "variants") if not values[key]]
+        return {key: value for key, value in values.items() if key not in unsaid}
 
     def identity(self) -> dict[str, Any]:
         """resolved() without NOT_IDENTITY: what the numbers of a run depend on. Of the link its faults, if any."""

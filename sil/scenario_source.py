@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 from typing import Any
 
-from sil.scenario_errors import Path, Problem, ScenarioInvalid, UnknownScenario, Where, printable, shown
+from sil.scenario_errors import Path, Problem, ScenarioInvalid, UnknownScenario, Where, one_of, printable, shown
 from sil.scenario_yaml import read_mapping, read_value
 from sil.scenarios import built_in_file, is_file, list_scenarios
 
@@ -24,6 +24,7 @@ class Source:
     data: dict[str, Any]
     where: dict[Path, Where]
     directories: dict[str, FilePath] = field(default_factory=dict)
+    recorded: bool = False  # plain values, such as those of a log, where a variant has been merged already
 
     def where_of(self, path: Path) -> Where:
         """Where `path`, or the nearest thing above it, was written."""
@@ -47,7 +48,7 @@ def from_values(values: dict[str, Any], where: str, directory: FilePath, sets: S
     """Plain values, lists allowed, in place of a file."""
     data = _tuples(values)
     assert isinstance(data, dict)
-    return _override(_normal(Source(data, {(): Where(where, 0)}, {where: directory})), sets)
+    return _override(_normal(Source(data, {(): Where(where, 0)}, {where: directory}, recorded=True)), sets)
 
 
 def _name_of(file: str) -> str:
@@ -100,6 +101,42 @@ def _text(file: FilePath, shown_name: str) -> str:
         raise ScenarioInvalid([Problem(shown_name, "file", "readable UTF-8 text", str(error))]) from None
 
 
+# -- variants ---------------------------------------------------------------------------------------------------------
+
+
+def _with_variant(source: Source, overlay: Source) -> Source:
+    """`source` with the variant that `variant` names merged over it, as a file is over what it extends; the others go.
+
+    A recorded scenario says which variant it was and has no variants, so nothing is merged a second time.
+    """
+    name = overlay.data.get("variant", source.data.get("variant"))
+    variants = source.data.get("variants") or {}
+    if name is None or (not variants and "variant" not in overlay.data and source.recorded):
+        return source
+    place = (overlay if "variant" in overlay.data else source).where_of(("variant",))
+    if not isinstance(variants, dict) or not isinstance(name, str) or not isinstance(variants.get(name), dict):
+        known = variants if isinstance(variants, dict) else {}
+        expected = one_of(known, name) if known else "no variant, since the scenario has no variants"
+        raise ScenarioInvalid([Problem(str(place), "variant", expected, shown(name), place.line)])
+    at: Path = ("variants", name)
+    inside = {path[2:]: where for path, where in source.where.items() if path[:2] == at and len(path) > 2}
+    over = _normal(Source(dict(variants[name]), inside))
+    rest = {key: value for key, value in source.data.items() if key != "variants"}
+    over.data.setdefault("name", f"{rest.get('name', 'scenario')}-{name}")
+    over.data["variant"] = name
+    return _merged(Source(rest, _without(source.where, ("variants",)), source.directories), over)
+
+
+def variants_of(name_or_path: str) -> list[tuple[str, str]]:
+    """(name, about) of the variants of a scenario file, for a shell; none where it cannot be read."""
+    try:
+        variants = _read(name_or_path, FilePath(), []).data.get("variants")
+    except ScenarioInvalid:
+        return []
+    known = variants.items() if isinstance(variants, dict) else ()
+    return [(name, str(keys.get("about", "")) if isinstance(keys, dict) else "") for name, keys in known]
+
+
 # -- overrides --------------------------------------------------------------------------------------------------------
 
 
@@ -117,7 +154,7 @@ def _override(source: Source, sets: Sequence[str]) -> Source:
             into_lists.append((path, value, where))
         else:
             _assign(overlay, path, value, where)
-    merged = _merged(source, _normal(overlay))
+    merged = _merged(_with_variant(source, overlay), _normal(overlay))
     for path, value, where in into_lists:
         merged.data = _replaced(merged.data, path, value, path)
         merged.where = _without(merged.where, path) | {path: where}

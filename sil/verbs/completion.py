@@ -65,6 +65,13 @@ def scenarios(incomplete: str) -> list[Offer]:
     return _fitting([*((info.name, info.about) for info in list_scenarios()), *here], incomplete)
 
 
+def variants(ctx: typer.Context, incomplete: str) -> list[Offer]:
+    """The variants of the scenario that this command line names."""
+    from sil.scenario_source import variants_of
+
+    return _fitting(((name, about) for name, about in variants_of(str(ctx.params.get("scenario") or ""))), incomplete)
+
+
 def runs(incomplete: str) -> list[Offer]:
     """Run directories here and in runs/, newest first."""
     found = [path.parent for pattern in ("runs/*/run.*", "*/run.*") for path in Path().glob(pattern)]
@@ -185,7 +192,7 @@ def _keys(law_names: tuple[str, ...]) -> Iterator[tuple[str, dict[str, Any]]]:
             reference = next((part["$ref"] for part in (schema, *schema.get("anyOf", ())) if "$ref" in part), "")
             if reference:
                 yield from below(known[reference.rpartition("/")[2]], f"{prefix}{name}.")
-            elif name != "extends" and f"{prefix}{name}" != "law.params":
+            elif name not in ("extends", "variants") and f"{prefix}{name}" != "law.params":
                 yield f"{prefix}{name}", schema
 
     yield from below(whole, "")

@@ -10,7 +10,15 @@ import typer
 
 from sil.trouble import EXIT_REQUIREMENT
 from sil.verbs import completion
-from sil.verbs.options import RESULT_PANEL, JsonOption, ScenarioArgument, SetOption, print_json
+from sil.verbs.options import (
+    RESULT_PANEL,
+    JsonOption,
+    ScenarioArgument,
+    SetOption,
+    VariantOption,
+    print_json,
+    variant_sets,
+)
 
 if TYPE_CHECKING:
     from sil.ladder.climb import Step
@@ -25,6 +33,7 @@ RUNGS_PANEL = "Rungs"
 def ladder(
     scenario: ScenarioArgument,
     set_: SetOption = None,
+    variant: VariantOption = None,
     with_: Annotated[
         list[str] | None,
         typer.Option(
@@ -84,7 +93,7 @@ def ladder(
     from sil.runner import new_run_dir
 
     with JunitFile(junit, scenario, about=THE_LADDER, source=Path(scenario)) as page:
-        flights = scenarios(scenario, set_ or (), chosen(rungs, with_ or ()))
+        flights = scenarios(scenario, [*(set_ or ()), *variant_sets(variant)], chosen(rungs, with_ or ()))
         name = flights[0][1].name
         folder, _ = new_run_dir(f"{name}-ladder", out)
         steps, interrupted = _climbed(flights, folder)

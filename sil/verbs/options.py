@@ -40,6 +40,16 @@ SetOption = Annotated[
         autocompletion=completion.sets,
     ),
 ]
+VariantOption = Annotated[
+    str | None,
+    typer.Option(
+        "--variant",
+        metavar="NAME",
+        help="One of the scenario's variants, such as another law; short for variant.",
+        rich_help_panel=KEYS_PANEL,
+        autocompletion=completion.variants,
+    ),
+]
 ClockOption = Annotated[
     str | None,
     typer.Option(
@@ -116,7 +126,9 @@ VerboseOption = Annotated[
     ),
 ]
 
-_KEYS = {"clock": "clock.mode", "link": "link.url", "board": "board", "priority": "clock.priority"}
+_KEYS = {"clock": "clock.mode", "link": "link.url", "priority": "clock.priority"} | {
+    key: key for key in ("variant", "board")
+}
 
 
 def scenario_from(name: str, sets: list[str] | None, **options: str | None) -> Scenario:
@@ -134,6 +146,11 @@ def cpu_sets(cpus: str | None) -> list[str]:
     if cpus is not None and not known:
         raise UsageError(f"--cpus: expected LAB,BOARD, numbers of CPUs such as 0,1, got {cpus!r}")
     return [f"{key}={part}" for key, part in zip(("clock.lab_cpu", "clock.board_cpu"), parts, strict=False) if part]
+
+
+def variant_sets(variant: str | None) -> list[str]:
+    """--variant as an override."""
+    return [] if variant is None else [f"variant={variant}"]
 
 
 def verbosity_of(quiet: bool, verbose: bool) -> int:

@@ -24,6 +24,7 @@ from sil.verbs.options import (
     QuietOption,
     ScenarioArgument,
     SetOption,
+    VariantOption,
     VerboseOption,
     cpu_sets,
     print_json,
@@ -60,6 +61,7 @@ def run(
         ),
     ] = None,
     set_: SetOption = None,
+    variant: VariantOption = None,
     priority: PriorityOption = None,
     cpus: CpusOption = None,
     out: OutOption = None,
@@ -86,7 +88,9 @@ def run(
 
     def load() -> Scenario:
         sets = [*(set_ or ()), *cpu_sets(cpus)]
-        return scenario_from(scenario, sets, clock=clock, link=link, board=board, priority=_text(priority))
+        return scenario_from(
+            scenario, sets, variant=variant, clock=clock, link=link, board=board, priority=_text(priority)
+        )
 
     return _run(scenario, load, Told(out, junit, as_json, verbosity_of(quiet, verbose)), wired=False)
 
@@ -105,6 +109,7 @@ def plant(
     ] = None,
     clock: ClockOption = None,
     set_: SetOption = None,
+    variant: VariantOption = None,
     priority: PriorityOption = None,
     cpus: CpusOption = None,
     out: OutOption = None,
@@ -127,7 +132,7 @@ def plant(
 
     def load() -> Scenario:
         sets = [*(set_ or ()), *cpu_sets(cpus)]
-        return scenario_from(scenario, sets, clock=clock, link=link, priority=_text(priority))
+        return scenario_from(scenario, sets, variant=variant, clock=clock, link=link, priority=_text(priority))
 
     return _run(scenario, load, Told(out, junit, as_json, verbosity_of(quiet, verbose)), wired=True)
 

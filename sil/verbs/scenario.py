@@ -8,15 +8,21 @@ from typing import Annotated
 import typer
 
 from sil.trouble import EXIT_OK, EXIT_USAGE
-from sil.verbs.options import JsonOption, ScenarioArgument, SetOption, print_json, scenario_from
+from sil.verbs.options import JsonOption, ScenarioArgument, SetOption, VariantOption, print_json, scenario_from
 
 
-def check(scenario: ScenarioArgument, set_: SetOption = None, as_json: JsonOption = False) -> int:
+def check(
+    scenario: ScenarioArgument,
+    set_: SetOption = None,
+    variant: VariantOption = None,
+    as_json: JsonOption = False,
+) -> int:
     """Validate a scenario and its time budget (wire and execution time against the period) without running it.
 
     Reads the scenario, what it extends and the files it names; writes nothing. Each finding is a line on stderr: file,
     line, key, what was expected and what stands there. Errors would keep it from running; a warning is something that
-    looks unintended. Then it names the JSON Schema for your editor, which checks keys and ranges as you type.
+    looks unintended. Without --variant all variants are checked, too. Then it names the JSON Schema for your editor,
+    which checks keys and ranges as you type.
 
     Exit codes: 0 valid, warnings or not; 2 an error.
 
@@ -25,8 +31,9 @@ def check(scenario: ScenarioArgument, set_: SetOption = None, as_json: JsonOptio
     from sil.checks import check as findings_of
     from sil.scenarios import SCHEMA
 
-    loaded = scenario_from(scenario, set_)
-    findings = findings_of(loaded)
+    loaded = scenario_from(scenario, set_, variant=variant)
+    others = [scenario_from(scenario, set_, variant=name) for name in loaded.variants]
+    findings = list(dict.fromkeys(finding for each in (loaded, *others) for finding in findings_of(each)))
     errors = [finding for finding in findings if finding.severity == "error"]
     if as_json:
         content = {"valid": not errors, "findings": [finding._asdict() for finding in findings], "schema": str(SCHEMA)}
@@ -37,6 +44,8 @@ def check(scenario: ScenarioArgument, set_: SetOption = None, as_json: JsonOptio
         return EXIT_USAGE
     if not as_json:
         print(f"{loaded.name}: valid, {loaded.ticks} ticks of {loaded.period_s:g} s")
+        if others:
+            print(f"its variants, valid: {', '.join(loaded.variants)}")
         print(f"schema for editors, first line of the file: # yaml-language-server: $schema={SCHEMA}")
     return EXIT_OK
 

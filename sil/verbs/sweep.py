@@ -20,8 +20,10 @@ from sil.verbs.options import (
     LinkOption,
     QuietOption,
     SetOption,
+    VariantOption,
     print_json,
     scenario_from,
+    variant_sets,
 )
 
 if TYPE_CHECKING:
@@ -97,6 +99,7 @@ def sweep(
         ),
     ] = None,
     set_: SetOption = None,
+    variant: VariantOption = None,
     clock: ClockOption = None,
     link: LinkOption = None,
     board: Annotated[
@@ -203,7 +206,7 @@ def sweep(
             raise UsageError("--resume: expected the directory of a sweep, got an empty text")
         if (
             scenario is not None
-            or any((vary, vary_file, draws, sample, set_, clock, link, board, out))
+            or any((vary, vary_file, draws, sample, set_, variant, clock, link, board, out))
             or seed is not None
         ):
             raise UsageError(
@@ -217,7 +220,8 @@ def sweep(
         raise UsageError("sweep: expected SCENARIO --vary KEY=SPEC, or --resume DIR, got neither")
     conditions = conditions_from(vary_file, vary or (), sample, draws, seed)
     varied = [spec.key for spec in conditions.specs]
-    base = base_of(scenario, [*conditions.sets, *(set_ or ())], varied, clock=clock, link=link, board=board)
+    sets = [*conditions.sets, *(set_ or ()), *variant_sets(variant)]
+    base = base_of(scenario, sets, varied, clock=clock, link=link, board=board)
     return interruptible(lambda: _fly(new_sweep(base, conditions, out, watch_of(manner.as_json, manner.quiet)), manner))
 
 
@@ -241,6 +245,7 @@ def base_of(
     To vary board or link.url says so too: in process all values would be alike. What the link does to frames is a
     model, and acts in process as anywhere.
     """
+    sets = [*sets, "variant=null"] if "variant" in varied else sets  # each point chooses its own
     own = scenario_from(name, sets, clock=clock, link=link, board=board)
     how = any(key in ("board", "link", "link.url") for key in varied)
     said = {text.partition("=")[0] for text in sets}

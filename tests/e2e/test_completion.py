@@ -90,7 +90,7 @@ def off(key: str) -> str:
 
 def test_every_key_of_a_scenario_can_be_reached_and_no_other() -> None:
     """Keys come from the schema, so that they cannot fall behind the model."""
-    assert sorted({off(key) or key for key in leaves()}) == sorted(resolved_keys())
+    assert sorted({off(key) or key for key in leaves()}) == sorted({*resolved_keys(), "variant"})
 
 
 def test_a_key_comes_with_its_values() -> None:
@@ -115,7 +115,7 @@ def test_values_that_are_offered_are_taken() -> None:
 )
 def test_parameters_are_those_of_the_law_on_the_line(arguments: tuple[str, ...], params: dict[str, object]) -> None:
     assert {word.partition("=")[0] for word in sets("law.params.", *arguments, **params)} == {
-        f"law.params.{name}" for name in ("kp_bits", "kd_bits", "kp", "kd")
+        f"law.params.{name}" for name in ("kp_bits", "kd_bits", "kp", "kd", "rate", "error")
     }
 
 
