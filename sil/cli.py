@@ -20,6 +20,7 @@ from sil.verbs import (
     board_test,
     compare,
     completion,
+    design,
     doctor,
     faults,
     ladder,
@@ -83,6 +84,7 @@ for _panel, _verbs in VERBS.items():
         _page = page_of(_verb)
         app.command(rich_help_panel=_panel, help=_page.help, epilog=_page.epilog)(_verb)
 
+app.add_typer(design.app, rich_help_panel="Prepare")
 
 DISK_FULL = (errno.ENOSPC, errno.EDQUOT)  # no usage error: the same command will do when there is room
 

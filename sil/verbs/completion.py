@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from io import StringIO
 from pathlib import Path
@@ -110,6 +110,11 @@ def check_groups(incomplete: str) -> list[Offer]:
 def rungs(incomplete: str) -> list[Offer]:
     """What `sil ladder --with` adds to the usual rungs."""
     return _fitting([("qemu", "the firmware's image in QEMU"), *_devices()], incomplete)
+
+
+def one_of(*words: str) -> Callable[[str], list[str]]:
+    """These words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
 def links(incomplete: str) -> list[Offer]:
