@@ -11,7 +11,8 @@ import math
 import struct
 import zlib
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from itertools import product
+from typing import Any, NamedTuple
 
 from protocol import laws
 from protocol.law_words import (
@@ -146,7 +147,7 @@ class Configuration(NamedTuple):
         return x, y, z
 
 
-Value = float | str | bool | Sequence[float]
+Value = float | str | bool | Sequence[Any]
 
 
 def config_words(table: LawTable, values: Mapping[str, Value], rows: Sequence[Sequence[int]] = ()) -> tuple[int, ...]:
@@ -174,7 +175,10 @@ def variant_of(table: LawTable, values: Mapping[str, Value]) -> Variant:
 
 
 def expand(table: LawTable, values: Mapping[str, Value]) -> dict[str, float | str | bool]:
-    """Values by word name: a triple becomes three words, one number under a triple's name sets all three."""
+    """Values by word name: a triple becomes three words, one number under a triple's name sets all three.
+
+    A list or matrix becomes all its words, zero where it ends.
+    """
     names = {word.name for word in (*COMMON, *table.params)}
     flat: dict[str, float | str | bool] = {}
     for name, value in values.items():
@@ -184,6 +188,8 @@ def expand(table: LawTable, values: Mapping[str, Value]) -> dict[str, float | st
             flat[name] = value
         elif f"{name}_x" in names:
             flat |= zip((f"{name}_{axis}" for axis in AXES), _triple(name, value), strict=True)
+        elif name in table.arrays:
+            flat |= _array(table, name, value)
         else:
             raise ConfigError(_unknown(table, name))
     return flat
@@ -194,12 +200,43 @@ def _triple(name: str, value: Value) -> Sequence[float]:
         return (value,) * 3
     if isinstance(value, str) or len(value) != 3:
         raise ConfigError(f"{name}: expected 3 numbers, got {value!r}")
-    return value
+    return tuple(value)
+
+
+def _array(table: LawTable, name: str, value: Value) -> dict[str, float]:
+    shape = [table.sizes[size] for size in table.arrays[name]]
+    given = elements(value, len(shape))
+    if given is None or any(i > size for index in given for i, size in zip(index, shape, strict=True)):
+        raise ConfigError(f"{name}: expected at most {' x '.join(map(str, shape))} numbers, got {value!r}")
+    every = product(*(range(1, size + 1) for size in shape))
+    return {"_".join((name, *map(str, index))): given.get(index, 0.0) for index in every}
+
+
+def elements(value: object, depth: int) -> dict[tuple[int, ...], float] | None:
+    """The numbers of a list (depth 1) or of a list of lists by their places, which count from 1; None: it is none."""
+    if depth == 0:
+        return {(): float(value)} if isinstance(value, int | float) else None
+    if not isinstance(value, Sequence) or isinstance(value, str):
+        return None
+    found: dict[tuple[int, ...], float] = {}
+    for number, item in enumerate(value, 1):
+        inner = elements(item, depth - 1)
+        if inner is None:
+            return None
+        found |= {(number, *index): each for index, each in inner.items()}
+    return found
 
 
 def _unknown(table: LawTable, name: str) -> str:
-    known = sorted({word.name.removesuffix("_x") for word in table.params if not word.name.endswith(("_y", "_z"))})
+    words = [word for word in table.params if not word.name.endswith(("_y", "_z"))]
+    known = sorted({array_of(table, word) or word.name.removesuffix("_x") for word in words})
     return f"law.params.{name}: unknown for law {table.name}; known: {', '.join(known)}"
+
+
+def array_of(table: LawTable, word: Word) -> str:
+    """The list or matrix that this word is an element of; empty: none."""
+    name = word.name.rstrip("0123456789_")
+    return name if name in table.arrays and word.name != name else ""
 
 
 def _automatic_bits(table: LawTable, bits: Word, flat: Mapping[str, float | str | bool]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import product
 from typing import NamedTuple
 
 from protocol.words import Word
@@ -46,6 +47,8 @@ class LawTable(NamedTuple):
     variants: tuple[Variant, ...] = ()
     finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
     only_321: str = ""  # word that, where it is not 0, makes this a law for 3-2-1 angles only; law_id: always
+    arrays: Mapping[str, tuple[str, ...]] = {}  # lists and matrices by name: the size, by name, in each direction
+    sizes: Mapping[str, int] = {}  # the largest value of each size; what is smaller is filled up with zeros
 
     def variant(self, params: Mapping[str, float]) -> Variant:
         """The design that these parameter values choose; of a law with one design, that one."""
@@ -60,6 +63,17 @@ def vector(name: str, unit: str, q: int | str, low: float, high: float, default:
     return tuple(
         Word(f"{name}_{axis}", unit, q, low, high, value, f"{about}, {axis}")
         for axis, value in zip(axes, default, strict=True)
+    )
+
+
+def array(name: str, unit: str, q: int | str, low: float, high: float, shape: tuple[int, ...], about: str,
+          default: Sequence[float] = ()) -> tuple[Word, ...]:  # fmt: skip
+    """The words name_1, name_2, ... of a list, name_1_1, name_1_2, ... of a matrix by rows; zero after `default`."""
+    indices = list(product(*(range(1, size + 1) for size in shape)))
+    filled = [*default, *[0.0] * (len(indices) - len(default))]
+    return tuple(
+        Word("_".join((name, *map(str, index))), unit, q, low, high, value, about)
+        for index, value in zip(indices, filled, strict=True)
     )
 
 

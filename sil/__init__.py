@@ -1,9 +1,9 @@
 """THE LABORATORY: plant, sensors, actuators, the loop, the log, and what a user calls.
 
-    import sil
-    run = sil.run("mrac-rs232", duration_s=120, **{"law.params.c2_pole": 0.7})
-    run = sil.open_run("runs/mrac-rs232-001")
-    run["phi_deg"], run.units["phi_deg"]
+import sil
+run = sil.run("mrac-rs232", duration_s=120, **{"law.params.c2_pole": 0.7})
+run = sil.open_run("runs/mrac-rs232-001")
+run["phi_deg"], run.units["phi_deg"]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The instruments of a scenario, put together: each sensor in its unit, with its faults around; the actuator with its.
 
-    truth -> sensor -> sampling: period, hold, delay, jitter -> faults -> SAMPLE        command -> faults -> actuator
+truth -> sensor -> sampling: period, hold, delay, jitter -> faults -> SAMPLE        command -> faults -> actuator
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """The law's own parameters in a scenario, checked against the table of the law (protocol/law_tables.py).
 
-A triple such as inertia_kgm2 is one key with three numbers here and three words (inertia_kgm2_x, _y, _z) on the wire.
+A triple such as inertia_kgm2 is one key with three numbers here and three words (inertia_kgm2_x, _y, _z) on the wire;
+a list or matrix such as A is one key with as many numbers as there are, and words up to its largest size on the wire.
 """
 
 from __future__ import annotations
@@ -8,10 +9,11 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Callable, Iterator, Mapping
+from itertools import product
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
 
-from protocol.law_tables import AUTOMATIC, INT32_MAX, LAWS, LawTable, Word, user_table
+from protocol.law_tables import AUTOMATIC, INT32_MAX, LAWS, LawTable, Word, array_of, elements, user_table
 from sil.scenario_errors import Path, Problem, Where, key_of, one_of, shown, unknown_key
 from sil.scenario_sections import is_number
 
@@ -21,10 +23,11 @@ OFF_ON = ("off", "on")
 
 
 class Param(NamedTuple):
-    """One key of law.params: one word, or the three words of a triple."""
+    """One key of law.params: one word, the three words of a triple, or those of a list or matrix."""
 
     name: str
     words: tuple[Word, ...]
+    shape: tuple[tuple[str, int], ...] = ()  # of a list or matrix: what each size is called, and the largest
 
 
 def is_user_law(name: str) -> bool:
@@ -65,6 +68,12 @@ def params_of(table: LawTable) -> list[Param]:
     params: list[Param] = []
     words = list(table.params)
     while words:
+        if name := array_of(table, words[0]):
+            shape = tuple((size, table.sizes[size]) for size in table.arrays[name])
+            count = math.prod(most for _, most in shape)
+            params.append(Param(name, tuple(words[:count]), shape))
+            del words[:count]
+            continue
         base = words[0].name.removesuffix("_x")
         triple = tuple(words[:3])
         if [word.name for word in triple] == [f"{base}_{axis}" for axis in "xyz"]:
@@ -77,7 +86,9 @@ def params_of(table: LawTable) -> list[Param]:
 
 def complete(table: LawTable, given: Mapping[str, Any]) -> dict[str, Any]:
     """All parameters with their defaults; null is automatic, or no limit; flags are true and false."""
-    return {param.name: _normal(param, given.get(param.name, _default(param))) for param in params_of(table)}
+    params = params_of(table)
+    defaults = {param.name: _default(param) for param in params if not param.shape} | _default_arrays(params)
+    return {param.name: _normal(param, given.get(param.name, defaults[param.name])) for param in params}
 
 
 def wire_values(table: LawTable, params: Mapping[str, Any]) -> dict[str, Any]:
@@ -101,11 +112,43 @@ def problems(table: LawTable, given: Mapping[str, Any], where_of: WhereOf) -> It
             yield unknown_key(place, path, known)
         elif expected := _refused(known[name], value):
             yield Problem(str(place), key_of(path), expected, shown(value), place.line)
+    yield from _size_problems([param for param in known.values() if param.shape], given, where_of)
+
+
+def _size_problems(arrays: list[Param], given: Mapping[str, Any], where_of: WhereOf) -> Iterator[Problem]:
+    """Lists and matrices that share a size: who gives one of them gives all, and all of the same size."""
+    sound = [param for param in arrays if param.name in given and not _refused(param, given[param.name])]
+    sizes: dict[str, tuple[int, str]] = {}  # by name: how many, and which key says so
+    for param in sound:
+        for (name, _), count in zip(param.shape, _lengths(given[param.name], len(param.shape)) or (), strict=False):
+            sizes.setdefault(name, (count, param.name))
+    for param in arrays if sizes else ():
+        value = given.get(param.name)
+        counts = [sizes[name][0] for name, _ in param.shape if name in sizes]
+        if param.name in given and (param not in sound or _lengths(value, len(param.shape)) == tuple(counts)):
+            continue
+        path: Path = ("law", "params", param.name)
+        place, first = where_of(path), sizes[param.shape[0][0]][1]
+        numbers = " rows of ".join(map(str, counts)) + " numbers"
+        expected = numbers if first == param.name else f"{numbers}, as {first} has"
+        got = shown(value) if param.name in given else "nothing"
+        yield Problem(str(place), key_of(path), expected, got, place.line)
+
+
+def _lengths(value: Any, depth: int) -> tuple[int, ...] | None:
+    """(rows, numbers in each) of what _refused() lets pass; None: the rows differ. An empty matrix is 0 x 0."""
+    if depth == 1 or not value:
+        return (len(value),) * depth
+    inner = {_lengths(item, depth - 1) for item in value}
+    return (len(value), *only) if len(inner) == 1 and (only := inner.pop()) is not None else None
 
 
 def _refused(param: Param, value: object) -> str | None:
     """What was expected, or None if the value will do."""
     word = param.words[0]
+    if param.shape:
+        most = " rows of ".join(str(n) for _, n in param.shape)
+        return None if _fits(param, value) else f"at most {most} numbers {_range(word)}"
     if value is None and (word.default == AUTOMATIC or math.isinf(word.maximum)):
         return None
     if len(param.words) == 3:
@@ -113,6 +156,14 @@ def _refused(param: Param, value: object) -> str | None:
         fits = len(items) == 3 and not any(_bad(w, item) for w, item in zip(param.words, items, strict=True))
         return None if fits else f"3 numbers {_range(word)}"
     return _expected(word, value) if _bad(word, value) else None
+
+
+def _fits(param: Param, value: object) -> bool:
+    """A list or matrix of good numbers, not larger than it may be."""
+    found = elements(value, len(param.shape))
+    if found is None or any(_bad(param.words[0], number) for number in found.values()):
+        return False
+    return all(i <= most for index in found for i, (_, most) in zip(index, param.shape, strict=True))
 
 
 def _bad(word: Word, value: object) -> bool:
@@ -146,6 +197,27 @@ def _range(word: Word) -> str:
     return f"{text} {word.unit}".rstrip() + (", or null" if math.isinf(word.maximum) else "")
 
 
+def _default_arrays(params: list[Param]) -> dict[str, Any]:
+    """Defaults of lists and matrices by name, without the zeros with which all that share a size are filled up."""
+    found: dict[str, dict[tuple[int, ...], float]] = {}
+    sizes: dict[str, int] = {}
+    for param in params:
+        indices = product(*(range(1, most + 1) for _, most in param.shape)) if param.shape else ()
+        found[param.name] = dict(zip(indices, (word.default for word in param.words), strict=False))
+        for index, number in found[param.name].items():
+            for (size, _), i in zip(param.shape, index, strict=True):
+                sizes[size] = max(sizes.get(size, 0), i if number else 0)
+    arrays = [param for param in params if param.shape]
+    return {param.name: _nested(found[param.name], [sizes[size] for size, _ in param.shape]) for param in arrays}
+
+
+def _nested(numbers: Mapping[tuple[int, ...], float], shape: list[int], at: tuple[int, ...] = ()) -> Any:
+    """The numbers by their places as a list, or a list of rows."""
+    if len(at) == len(shape):
+        return numbers[at]
+    return [_nested(numbers, shape, (*at, i)) for i in range(1, shape[len(at)] + 1)]
+
+
 def _default(param: Param) -> Any:
     values = [None if word.default == AUTOMATIC else word.default for word in param.words]
     return values[0] if len(values) == 1 else values
@@ -153,6 +225,8 @@ def _default(param: Param) -> Any:
 
 def _normal(param: Param, value: Any) -> Any:
     word = param.words[0]
+    if param.shape:
+        return _floats(value)
     if len(param.words) == 3:
         return tuple(float(item) for item in (value if isinstance(value, tuple | list) else (value,) * 3))
     if value is None or value == math.inf:
@@ -162,3 +236,7 @@ def _normal(param: Param, value: Any) -> Any:
     if word.choices:
         return value if isinstance(value, str) else word.choices[int(value)]
     return int(value) if word.q == 0 and not word.lsb else float(value)
+
+
+def _floats(value: Any) -> Any:
+    return tuple(map(_floats, value)) if isinstance(value, tuple | list) else float(value)

@@ -159,14 +159,25 @@ def _params(table: LawTable) -> Schema:
     properties = {}
     for param in laws.params_of(table):
         word = param.words[0]
-        about = word.about.removesuffix(", x") if len(param.words) == 3 else word.about
+        about = word.about.removesuffix(", x")
         properties[param.name] = {
-            **(_one_or_three(word) if len(param.words) == 3 else _value(word)),
+            **_shape(param),
             "default": defaults[param.name],
             "description": f"[{word.unit}] {about}" if word.unit else about,
         }
     about = f"Parameters of law {table.name}, version {table.version}."
     return {"description": about, "type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _shape(param: laws.Param) -> Schema:
+    """One number, one or three, a list, or a list of rows."""
+    word = param.words[0]
+    if not param.shape:
+        return _one_or_three(word) if len(param.words) == 3 else _value(word)
+    schema = _value(word)
+    for _, most in reversed(param.shape):
+        schema = {"type": "array", "items": schema, "maxItems": most}
+    return schema
 
 
 def _one_or_three(word: Word) -> Schema:

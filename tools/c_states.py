@@ -14,6 +14,7 @@ import numpy as np
 from firmware_sim.controllers.appc import Appc
 from firmware_sim.controllers.mrac import Mrac
 from firmware_sim.controllers.pd import Pd
+from firmware_sim.controllers.state_space import StateSpace
 from firmware_sim.fields import Field
 from firmware_sim.guidance import reference
 
@@ -23,6 +24,7 @@ STRUCTS: dict[str, tuple[str, tuple[Field, ...], tuple[Field, ...]]] = {
     "pd": ("the law pd, controllers/pd.py", Pd.PAR, Pd.STATE),
     "mrac": ("the law mrac, controllers/mrac.py", Mrac.PAR, Mrac.STATE),
     "appc": ("the law appc, controllers/appc.py", Appc.PAR, Appc.STATE),
+    "state_space": ("the law state_space, controllers/state_space.py", StateSpace.PAR, StateSpace.STATE),
 }
 
 HEAD = """\

@@ -24,6 +24,7 @@ typedef union {
     pd pd;
     mrac mrac;
     appc appc;
+    state_space state_space;
 } law_memory;
 
 /* A SAMPLE taken apart. */

@@ -16,6 +16,7 @@ LAWS: dict[str, str] = {
     "pd": "firmware_sim.controllers.pd:Pd",
     "mrac": "firmware_sim.controllers.mrac:Mrac",
     "appc": "firmware_sim.controllers.appc:Appc",
+    "state_space": "firmware_sim.controllers.state_space:StateSpace",
 }
 # Files of this folder that are not laws.
 SUPPORT = ("attitude_error", "compiled", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")

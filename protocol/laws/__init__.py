@@ -14,9 +14,10 @@ LAWS: dict[str, str] = {
     "pd": "protocol.laws.pd:PD",
     "mrac": "protocol.laws.mrac:MRAC",
     "appc": "protocol.laws.appc:APPC",
+    "state_space": "protocol.laws.state_space:STATE_SPACE",
 }
 # Those that the C firmware has; to the others a board that runs it answers READY with status 2, unknown law.
-IN_C = ("pd", "mrac", "appc")
+IN_C = ("pd", "mrac", "appc", "state_space")
 
 
 def tables() -> Iterator[LawTable]:

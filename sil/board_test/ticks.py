@@ -23,6 +23,8 @@ TRANSIT_US = 6857
 ORDER = ("Command", "Telemetry", "Event")
 RANDOM_STEPS = 300
 LIMIT_NM = 0.02  # so that some torques are at it
+IDENTIFY = ("mrac", "appc")
+WITH_MODEL = IDENTIFY  # the other laws repeat
 BUSY_US = 420_000  # a TICK, or a SAMPLE that took long, makes the next one an overrun
 SEED = 4
 
@@ -49,7 +51,7 @@ def _codes(answers: list[Any]) -> list[str]:
 
 def _without(twin: Twin) -> str:
     """How the law steps without a reading."""
-    return "repeated" if twin.table.name == "pd" else "propagated"
+    return "propagated" if twin.table.name in WITH_MODEL else "repeated"
 
 
 def _start(twin: Twin, count: int) -> list[Any]:
@@ -90,7 +92,7 @@ def tick_frame(at: Examinee) -> Finding:
         got = twin.send(Tick(6))
         expect("TICK(6)", [f"6 {_without(twin)}"], _used(got))
         expect("events of TICK(6)", ["SAMPLE_LOST"], _codes(got))
-        if twin.table.name == "pd":
+        if twin.table.name not in WITH_MODEL:
             expect("torque that is repeated", last.torque, the_command(got).torque)
         expect("TICK(8)", [f"{k} {_without(twin)}" for k in (7, 8)], _used(twin.send(Tick(8))))
         expect("TICK(8) again", [], twin.send(Tick(8)))
@@ -246,7 +248,7 @@ def identification(at: Examinee) -> Finding:
         flags = []
         for tick in range(31, 36):
             flags.append(bool(the_command(twin.send(sample(tick))).flags & frames.FLAG_IDENTIFICATION_PAUSED))
-        if twin.table.name != "pd":
+        if twin.table.name in IDENTIFY:
             expect("paused in the five ticks behind a lost sample", [True, True, False, False, False], flags)
 
     _each(at, check)

@@ -10,7 +10,7 @@ from typing import Any
 from protocol import frames
 from protocol.channel import Channel
 from protocol.frames import STOP_DONE, Tick, Type
-from sil.budget import SCENARIOS
+from sil.budget import SCENARIOS, SETS
 from sil.rig import assemble
 from sil.runs import Run
 from sil.scenario import Scenario, load_scenario
@@ -54,7 +54,7 @@ class _Row:
 
 def fly_manoeuvre_a(law: str, *sets: str) -> Flight:
     """The whole of it with noise, by the Python board in this process, in lockstep; nothing is written."""
-    return fly(load_scenario(SCENARIOS[law], [*MANOEUVRE_A, *sets]))
+    return fly(load_scenario(SCENARIOS[law], [*MANOEUVRE_A, *SETS.get(law, ()), *sets]))
 
 
 def fly(scenario: Scenario, channel: Channel | None = None) -> Flight:

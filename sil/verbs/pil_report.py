@@ -27,7 +27,7 @@ def pil_report(
         list[str] | None,
         typer.Argument(
             metavar="LAWS",
-            help="pd, appc, mrac. Default: all of them.",
+            help=f"{', '.join(LAWS)}. Default: all of them.",
             autocompletion=lambda incomplete: [law for law in LAWS if law.startswith(incomplete)],
         ),
     ] = None,
@@ -52,8 +52,8 @@ def pil_report(
 
     Flies manoeuvre A with noise on the Python board, feeds the same frames to the image on the emulated Cortex-M, which
     has to give the same answers, and counts. Instructions are exact and repeatable, but no cycles: the milliseconds are
-    an assumption (--board-clock, --cpi). Limits: 5,000 instructions per step of pd, 20,000 of appc, 40,000 of mrac;
-    2 KiB of stack; 24 KiB of code. Writes nothing.
+    an assumption (--board-clock, --cpi). Limits: 5,000 instructions per step of pd, 20,000 of appc, 40,000 of mrac,
+    10,000 of state_space (measured with order 8); 2 KiB of stack; 32 KiB of code. Writes nothing.
 
     Exit codes: 0 within limits and baseline, 1 beyond one of them, 2 usage, no unicorn or no image, 3 the image does
     not answer as the Python board, 130 interrupted.

@@ -26,6 +26,7 @@ VARIANTS = {
     "pd": ({}, {"rate": "sensed"}, BODY),
     "mrac": ({}, {"decouple": 1}, {"design": "printed"}),
     "appc": ({}, {"gyro": 1}, {"adapt": 0}),
+    "state_space": ({}, {"error": "euler", "anti_windup": 1, "A": [[1.0]], "B": [0.1], "C": [0.05], "D": 0.1}),
 }
 EACH = [(name, form, values) for name in LAWS for form in FORMS for values in VARIANTS.get(name, ({},))]
 each = pytest.mark.parametrize(("name", "form", "values"), EACH, ids=lambda value: str(value))

@@ -159,9 +159,42 @@ typedef struct appc {
     appc_state state;
 } appc;
 
+typedef struct {
+    int32_t A[64];       /* state Q(state_bits + 16) per state Q(state_bits), less I: mantissa of A_shift */
+    int32_t B[8];        /* state Q(state_bits + 16) per rad Q29: mantissa of B_shift */
+    int32_t C[24];       /* torque LSB per state Q(state_bits): mantissa of C_shift */
+    int32_t D[3];        /* torque LSB per rad Q29: mantissa of D_shift */
+    int32_t limit[3];    /* N m */
+    int32_t A_shift;     /* bit */
+    int32_t B_shift;     /* bit */
+    int32_t C_shift[3];  /* bit */
+    int32_t D_shift[3];  /* bit */
+    int32_t order;
+    int32_t anti_windup;
+    int32_t error_kind;
+    int32_t sequence;
+} state_space_par;
+
+typedef struct {
+    int64_t x[24];      /* 1 */
+    int64_t next[8];    /* 1 */
+    int32_t error[3];   /* rad Q29 */
+    int32_t command[3]; /* N m */
+    int32_t high[8];    /* 1 */
+    int32_t started;
+    int32_t arithmetic;
+} state_space_state;
+
+/* the law state_space, controllers/state_space.py */
+typedef struct state_space {
+    state_space_par par;
+    state_space_state state;
+} state_space;
+
 _Static_assert(sizeof(reference) == 184, "padding in reference");
 _Static_assert(sizeof(pd) == 128, "padding in pd");
 _Static_assert(sizeof(mrac) == 672, "padding in mrac");
 _Static_assert(sizeof(appc) == 352, "padding in appc");
+_Static_assert(sizeof(state_space) == 776, "padding in state_space");
 
 #endif

@@ -6,6 +6,11 @@ const range_scale RANGE_SCALES[] = {
     {4835703278458517, 4503599627370496, -82, 0, 10}, /* torque_bits: -1e-09 to inf */
     {8589934600589943, 8589934600589943, -33, -33, 26}, /* kp_bits: -1000000.001 to 1000000.001 */
     {8589934600589943, 8589934600589943, -33, -33, 27}, /* kd_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 33}, /* axis_gain_bits: -1000000.001 to 1000000.001 */
+    {8796093031012889, 8796093031012889, -43, -43, 29}, /* A_bits: -1000.000001 to 1000.000001 */
+    {8589934600589943, 8589934600589943, -33, -33, 30}, /* B_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 31}, /* C_bits: -1000000.001 to 1000000.001 */
+    {8589934600589943, 8589934600589943, -33, -33, 32}, /* D_bits: -1000000.001 to 1000000.001 */
 };
 
 const word_range COMMON_RANGES[COMMON_WORDS] = {
@@ -81,8 +86,104 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
     {-274, 1924145623, NO_WORD}, /* orbit_rate_radps */
 };
 
+static const word_range STATE_SPACE_RANGES[STATE_SPACE_WORDS] = {
+    {0, 1, NO_WORD}, /* error */
+    {0, 1, NO_WORD}, /* anti_windup */
+    {0, 30, NO_WORD}, /* state_bits */
+    {0, 45, NO_WORD}, /* A_bits */
+    {0, 45, NO_WORD}, /* B_bits */
+    {0, 45, NO_WORD}, /* C_bits */
+    {0, 45, NO_WORD}, /* D_bits */
+    {0, 45, NO_WORD}, /* axis_gain_bits */
+    {INT32_MIN, INT32_MAX, 3}, /* gain_x */
+    {INT32_MIN, INT32_MAX, 3}, /* gain_y */
+    {INT32_MIN, INT32_MAX, 3}, /* gain_z */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_1_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_2_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_3_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_4_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_5_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_6_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_7_8 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_1 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_2 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_3 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_4 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_5 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_6 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_7 */
+    {INT32_MIN, INT32_MAX, 4}, /* A_8_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* B_8 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_1 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_2 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_3 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_4 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_5 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_6 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_7 */
+    {INT32_MIN, INT32_MAX, 6}, /* C_8 */
+    {INT32_MIN, INT32_MAX, 7}, /* D */
+};
+
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
     {1, 2, 0x72A0703C, PD_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}, {0x1F, 0x06, 5}}, PD_WORDS, 8, NO_WORD, NO_WORD}, /* pd */
     {2, 1, 0x5C9EFFBA, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02, 1}, {0x02, 0x04, 1}}, MRAC_WORDS, 0, 4, 32}, /* mrac */
     {3, 1, 0x2A4D5A9F, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
+    {7, 1, 0x590BF8AE, STATE_SPACE_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}}, STATE_SPACE_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* state_space */
 };

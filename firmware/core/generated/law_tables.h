@@ -9,6 +9,7 @@
 enum { PD_LAW_ID = 1, PD_LAW_VERSION = 2 };
 enum { MRAC_LAW_ID = 2, MRAC_LAW_VERSION = 1 };
 enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 1 };
+enum { STATE_SPACE_LAW_ID = 7, STATE_SPACE_LAW_VERSION = 1 };
 
 /* CONFIG, common words. */
 enum {
@@ -91,6 +92,103 @@ enum {
     APPC_WORDS = 8
 };
 
+/* CONFIG words of state_space, from the law's first. */
+enum {
+    STATE_SPACE_ERROR = 0,             /* attitude error: difference of the Euler angles, or in body axes */
+    STATE_SPACE_ANTI_WINDUP = 1,       /* while the torque is at its limit, no state moves that would drive it on */
+    STATE_SPACE_STATE_BITS = 2,        /* fractional bits of the states: they reach 2^(31 - state_bits) */
+    STATE_SPACE_A_BITS = 3,            /* fractional bits of A */
+    STATE_SPACE_B_BITS = 4,            /* fractional bits of B */
+    STATE_SPACE_C_BITS = 5,            /* fractional bits of C */
+    STATE_SPACE_D_BITS = 6,            /* fractional bits of D */
+    STATE_SPACE_AXIS_GAIN_BITS = 7,    /* fractional bits of gain */
+    STATE_SPACE_GAIN_X = 8,            /* 2^-axis_gain_bits: what the output is multiplied with, x */
+    STATE_SPACE_GAIN_Y = 9,            /* 2^-axis_gain_bits: what the output is multiplied with, y */
+    STATE_SPACE_GAIN_Z = 10,           /* 2^-axis_gain_bits: what the output is multiplied with, z */
+    STATE_SPACE_A_1_1 = 11,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_2 = 12,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_3 = 13,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_4 = 14,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_5 = 15,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_6 = 16,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_7 = 17,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_1_8 = 18,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_1 = 19,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_2 = 20,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_3 = 21,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_4 = 22,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_5 = 23,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_6 = 24,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_7 = 25,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_2_8 = 26,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_1 = 27,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_2 = 28,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_3 = 29,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_4 = 30,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_5 = 31,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_6 = 32,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_7 = 33,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_3_8 = 34,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_1 = 35,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_2 = 36,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_3 = 37,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_4 = 38,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_5 = 39,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_6 = 40,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_7 = 41,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_4_8 = 42,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_1 = 43,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_2 = 44,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_3 = 45,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_4 = 46,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_5 = 47,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_6 = 48,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_7 = 49,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_5_8 = 50,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_1 = 51,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_2 = 52,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_3 = 53,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_4 = 54,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_5 = 55,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_6 = 56,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_7 = 57,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_6_8 = 58,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_1 = 59,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_2 = 60,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_3 = 61,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_4 = 62,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_5 = 63,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_6 = 64,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_7 = 65,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_7_8 = 66,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_1 = 67,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_2 = 68,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_3 = 69,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_4 = 70,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_5 = 71,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_6 = 72,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_7 = 73,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_A_8_8 = 74,            /* 2^-A_bits: state to state of the next tick */
+    STATE_SPACE_B_1 = 75,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_2 = 76,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_3 = 77,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_4 = 78,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_5 = 79,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_6 = 80,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_7 = 81,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_B_8 = 82,              /* 2^-B_bits 1/rad: error to state */
+    STATE_SPACE_C_1 = 83,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_2 = 84,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_3 = 85,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_4 = 86,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_5 = 87,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_6 = 88,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_7 = 89,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_C_8 = 90,              /* 2^-C_bits N m: state to output */
+    STATE_SPACE_D = 91,                /* 2^-D_bits N m/rad: error to output */
+    STATE_SPACE_WORDS = 92
+};
+
 /* TELEMETRY, common words. */
 enum {
     TELEMETRY_REFERENCE_X = 0,         /* 2^-32 turn: reference ym(k), x */
@@ -157,6 +255,14 @@ enum {
     APPC_TELEMETRY_WORDS = 12
 };
 
+/* TELEMETRY words of state_space, from the law's first. */
+enum {
+    STATE_SPACE_TELEMETRY_ERROR_X = 0,    /* 2^-29 rad: ym(k) - y(k), x */
+    STATE_SPACE_TELEMETRY_ERROR_Y = 1,    /* 2^-29 rad: ym(k) - y(k), y */
+    STATE_SPACE_TELEMETRY_ERROR_Z = 2,    /* 2^-29 rad: ym(k) - y(k), z */
+    STATE_SPACE_TELEMETRY_WORDS = 3
+};
+
 /* What the values of a word with choices mean. */
 enum { COMMON_FORM_FIXED = 0, COMMON_FORM_FLOAT = 1 };
 enum { COMMON_REFERENCE_KIND_NONE = 0, COMMON_REFERENCE_KIND_ZOH = 1, COMMON_REFERENCE_KIND_PAPER = 2 };
@@ -170,10 +276,12 @@ enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };
 enum { APPC_ADAPT_OFF = 0, APPC_ADAPT_ON = 1 };
 enum { APPC_GYRO_OFF = 0, APPC_GYRO_ON = 1 };
+enum { STATE_SPACE_ERROR_EULER = 0, STATE_SPACE_ERROR_QUATERNION = 1 };
+enum { STATE_SPACE_ANTI_WINDUP_OFF = 0, STATE_SPACE_ANTI_WINDUP_ON = 1 };
 
 enum {
     ROW_WORDS = 4, /* of one guidance row: tick, x, y, z */
-    LAW_TABLES_COUNT = 3,
+    LAW_TABLES_COUNT = 4,
     NO_WORD = 255
 };
 

@@ -8,6 +8,7 @@ static union {
     pd pd;
     mrac mrac;
     appc appc;
+    state_space state_space;
 } memory;
 static reference ref;
 

@@ -170,7 +170,28 @@ def _appc(rng: np.random.Generator) -> dict[str, Any]:
     return {**_common(rng, float(rng.uniform(0.2, 1.0))), **values}
 
 
-CONFIGURATIONS = {"pd": _pd, "mrac": _mrac, "appc": _appc}
+def _state_space(rng: np.random.Generator) -> dict[str, Any]:
+    """PD with a filtered derivative, and states beside it that do little; one in ten has numbers without any sense."""
+    period, n = float(np.exp(rng.uniform(math.log(0.05), math.log(5.0)))), int(rng.integers(1, 9))
+    values = {
+        **_readings(rng),
+        "anti_windup": int(rng.random() < 0.5),
+        "state_bits": int(rng.integers(18, 29)),
+        **_common(rng, period),
+    }
+    if rng.random() < 0.1:
+        A, B, C, D = (10.0 ** rng.uniform(-4, 2, (8, 8)) * rng.choice([-1, 0, 1], (8, 8)) for _ in range(4))
+        return values | {"A": A.tolist(), "B": B[0].tolist(), "C": C[0].tolist(), "D": float(D[0, 0])}
+    wn, pole = rng.uniform(0.02, 0.15) / period, rng.uniform(0.2, 0.8)
+    kd = 2 * rng.uniform(0.5, 1.2) * wn / period * (1 - pole)
+    A = np.diag([pole, *rng.choice([1.0, rng.uniform(0.3, 0.99)], n - 1)]) + 0.01 * np.tri(n, n, -1)
+    B, C = np.append(1 - pole, rng.normal(0, 0.02, n - 1)), np.append(-kd, rng.normal(0, 0.02, n - 1) * wn * wn)
+    scale = 2.0 ** rng.integers(-3, 3, n)
+    values |= {"A": (A * scale[:, None] / scale).tolist(), "B": (B * scale).tolist(), "C": (C / scale).tolist()}
+    return values | {"D": float(wn * wn + kd), "gain": (np.array([2.13, 3.04, 3.09]) * rng.uniform(0.8, 1.2)).tolist()}
+
+
+CONFIGURATIONS = {"pd": _pd, "mrac": _mrac, "appc": _appc, "state_space": _state_space}
 
 
 def _flight(configuration: Configuration, rng: np.random.Generator, wild: bool) -> Episode:

@@ -24,13 +24,14 @@ EPISODES = 24
 ROUND = "sum64(x, (int64_t)(UINT64_C(1) << (n - 1))) >> n"
 KEEP32 = "        *flag = 1;\n    }\n    return sat32(x);"
 QUOTIENT = "(a < 0) == (b < 0) ? (int64_t)quotient : difference64(0, (int64_t)quotient)"
+THREE = ("pd", "mrac", "appc")
 # file, what stands there once, what shall stand there, laws in which it has to show
 MUTATIONS = {
     "shift_round truncates": ("fixed.h", ROUND, "x >> n", IN_C),
     "a C division for the shift": ("fixed.h", ROUND, f"{ROUND[:-5]} / (int64_t)(UINT64_C(1) << n)", IN_C),
-    "keep32 wraps": ("fixed.h", KEEP32, KEEP32.replace("sat32", "wrap32"), IN_C),
+    "keep32 wraps": ("fixed.h", KEEP32, KEEP32.replace("sat32", "wrap32"), THREE),
     "sat32 lets through what is too small": ("fixed.h", "x < INT32_MIN ? INT32_MIN :", "0 ? INT32_MIN :", ("appc",)),
-    "division rounds down": ("fixed.c", QUOTIENT, QUOTIENT.replace("0, ", "n % d == 0 ? 0 : -1, "), IN_C),
+    "division rounds down": ("fixed.c", QUOTIENT, QUOTIENT.replace("0, ", "n % d == 0 ? 0 : -1, "), THREE),
     "mul_wide forgets the upper half": ("fixed.h", "sum64(high, low >> 32)", "low >> 32", ("mrac",)),
     "one coefficient of the sine is off by one": ("fixed.c", "35791394", "35791395", ("mrac", "appc")),
     "identification one tick early": ("mrac.c", "s->steps >= 3", "s->steps >= 2", ("mrac",)),
@@ -39,6 +40,7 @@ MUTATIONS = {
     "the derivative not over the gap": ("pd.c", "div_trunc(change[i], s->gap)", "change[i]", ("pd",)),
     "half a turn the long way": ("attitude_error.c", "w >= 0 ? z : -z", "z", ("pd",)),
     "angles of the other sequence": ("attitude_error.c", "sequence != COMMON", "sequence == COMMON", ("pd",)),
+    "a state without an end": ("state_space.c", "clip(x, -STATE_MAX, STATE_MAX)", "x", ("state_space",)),
     "the reference of the other lead": ("reference.c", "s->lead == 2", "s->lead != 2", IN_C),
 }
 

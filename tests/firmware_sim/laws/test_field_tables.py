@@ -16,7 +16,12 @@ from protocol.laws import IN_C
 from tools.c_states import STRUCTS, c_dtype, c_order, c_size
 
 TABLES = [(name, table) for name, (_, par, state) in STRUCTS.items() for table in (par, state)]
+EIGHT = [1000.0] * 8
 CORNERS = {
+    "state_space": [
+        {"A": [EIGHT] * 8, "B": EIGHT, "C": EIGHT, "D": 1e6, "gain": -1.0, "state_bits": 20},
+        {"A": [[1.0]], "B": [1e-12], "C": [1e-12], "gain": 1e-12, "torque_bits": 8, "state_bits": 30},
+    ],
     "pd": [
         {"period_us": 1000, "kd": 1e6, "kp": -1e6},
         {"period_us": 10_000_000, "kd": 1e-9, "torque_bits": 8},

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import pytest
 
+from sil.budget import SCENARIOS
 from sil.budget.flight import Flight, flight_of, fly_manoeuvre_a
 from sil.budget.judge import beyond_limits, figures, grown, read_baseline
 from sil.budget.measure import Budget, measure
@@ -26,7 +27,7 @@ from sil.scenario import load_scenario
 from sil.trouble import LinkFailure, UsageError
 
 BASELINE = Path(__file__).resolve().parents[2] / "firmware" / "budget.json"
-LAWS = ("pd", "appc", "mrac")
+LAWS = tuple(SCENARIOS)
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,7 @@ def test_two_percent_of_growth_is_the_limit(budget: Budget, grown_by: float, fou
 def test_limits_are_judged(budget: Budget) -> None:
     cost = budget.laws["pd"]
     greedy = cost._replace(law_step=cost.law_step._replace(max=5_001), stack_bytes=2_049)
-    bloated = budget._replace(laws={"pd": greedy}, image_bytes={**budget.image_bytes, "code": 24 * 1024 + 1})
+    bloated = budget._replace(laws={"pd": greedy}, image_bytes={**budget.image_bytes, "code": 32 * 1024 + 1})
     assert [each.what for each in beyond_limits(bloated)] == [
         "pd: instructions per law step", "pd: stack in bytes", "code in bytes"
     ]  # fmt: skip
@@ -156,7 +157,7 @@ def test_the_verb_judges_by_limits_and_baseline(tmp_path: Path, capsys: pytest.C
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["mrak"], "LAWS: expected one of pd, appc, mrac (did you mean mrac?), got 'mrak'"),
+        (["mrak"], "LAWS: expected one of pd, appc, mrac, state_space (did you mean mrac?), got 'mrak'"),
         (["pd", "--against", "nowhere.json"], "nowhere.json: cannot read: No such file or directory"),
         (["pd", "--image", "nowhere.elf"], "cortex-m: nowhere.elf: no such image: build it with `make firmware`"),
     ],
