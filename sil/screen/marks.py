@@ -13,6 +13,8 @@ LEVELS = " ▁▂▃▄▅▆▇█"
 FULL, LEFT_HALF, RIGHT_HALF, ZERO = "━", "╸", "╺", "┿"
 DOTS = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # braille bit of (row, column) within a cell
 BRAILLE = 0x2800
+LARGEST = 1e12  # what is beyond it, of either sign, is not drawn
+RESOLVED = 1e-9  # of the largest number of a span: closer labels could not be told apart
 
 Points = Sequence[tuple[float, float]]
 
@@ -114,9 +116,10 @@ def _line(cells: list[list[int]], index: int, start: tuple[int, int], end: tuple
 
 
 def span(values: Sequence[float], least: float) -> tuple[float, float]:
-    """(low, high) round numbers around the finite values, at least `least` apart."""
-    finite = [value for value in values if math.isfinite(value)]
-    low, high = (min(finite), max(finite)) if finite else (0.0, 0.0)
+    """(low, high) round numbers around the values up to LARGEST, at least `least` apart, and so far that floats can."""
+    drawn = [value for value in values if abs(value) <= LARGEST]
+    low, high = (min(drawn), max(drawn)) if drawn else (0.0, 0.0)
+    least = max(least, RESOLVED * max(abs(low), abs(high)))
     if high - low < least:
         middle = (low + high) / 2
         low, high = middle - least / 2, middle + least / 2

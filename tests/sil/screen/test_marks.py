@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sil.screen import marks
@@ -67,10 +67,12 @@ def test_a_chart_draws_a_rising_line() -> None:
 
 
 @given(st.lists(ANY, max_size=20), st.floats(1e-6, 10))
+@example([8589934592.0], 1e-6)
+@example([1e12, 1e12, -math.inf, 1e308], 1e-6)
 def test_a_span_holds_its_values(values: list[float], least: float) -> None:
     """Protects: the numbers beside a chart are above and below everything drawn in it."""
-    finite = [value for value in values if abs(value) < 1e12]
-    low, high = marks.span(finite, least)
+    finite = [value for value in values if abs(value) <= marks.LARGEST]
+    low, high = marks.span(values, least)
     slack = 1e-9 * max(abs(low), abs(high), 1)
     assert high > low
     assert all(low - slack <= value <= high + slack for value in finite)
