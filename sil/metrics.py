@@ -1,8 +1,9 @@
 """Figures of merit of a run, and the verdict on its requirements. All of it from the log, none of it from a clock.
 
 Errors are attitude - reference (recomputed in float64 apart from the board, sil.reference) and attitude - set-point,
-both from truth, modulo a turn, from tick `metrics.from_tick` on. A three-number metric is [roll, pitch, yaw]; NaN
-anywhere in its rows makes it NaN, and NaN meets no requirement.
+both from truth, modulo a turn, from tick `metrics.from_tick` on. Ticks whose reference nobody knows are left out: those
+from the start of the run, or of a session, to the first TELEMETRY that comes of it. A three-number metric is
+[roll, pitch, yaw]; NaN anywhere in its rows makes it NaN, and NaN meets no requirement.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def measure(run: Run) -> dict[str, Any]:
     settings = run.scenario.get("metrics") or {}
     first = int(settings.get("from_tick") or 0)
     rows = run.tick >= first
-    error = run.error_deg[rows & _reference_began(run)]
+    error = run.error_deg[rows & np.isfinite(run.reference_deg).all(axis=1)]
     if not np.isfinite(run.reference_deg).any():
         error = run.setpoint_error_deg[rows]  # no reference model in this run: the set-point is the reference
     torque, dwell = run.applied_Nm[rows], dwell_ticks(run)
@@ -80,12 +81,6 @@ def measure(run: Run) -> dict[str, Any]:
         MISMATCH: reference_mismatch_deg(run),
         **_counts(run),
     }
-
-
-def _reference_began(run: Run) -> Array:
-    """(N,) from the first tick with a reference on: where the first SAMPLEs were lost, there is none yet."""
-    began: Array = np.maximum.accumulate(np.isfinite(run.reference_deg).all(axis=1))
-    return began
 
 
 def diverged_at_s(run: Run, beyond_deg: float | None = DIVERGED_deg) -> float | None:

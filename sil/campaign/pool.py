@@ -1,4 +1,8 @@
-"""Worker processes that fly points: each has one point at a time, and one that dies costs that point only."""
+"""Worker processes that fly points: each has one point at a time, and one that dies costs that point only.
+
+So does one that hangs or is stopped (SIGSTOP): a worker says about once a second that ticks go by. After QUIET_S
+without a word there is a line, after GIVE_UP_S it is killed and its point has failed; another worker goes on.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +14,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
@@ -19,7 +23,9 @@ from sil.launched import child_environment
 from sil.trouble import LinkFailure
 
 STOP_S = 5.0
-READY = b'{"ready": true}'
+QUIET_S = 30.0  # a law that compiles and a long log that is sealed are silent, too
+GIVE_UP_S = 300.0  # as long as a board may take to be ready; nothing else takes so long
+READY, ALIVE = b'{"ready": true}', b'{"alive": true}'
 Order = dict[str, Any]  # point, sets, folder, keep
 
 
@@ -38,6 +44,8 @@ class Worker:
         self.order: Order | None = None
         self.ready = False
         self.nonsense = ""
+        self.heard_s = time.monotonic()  # when it last said something, or was given a point
+        self.told = False  # that it is quiet
         self._rest = b""
         self._send(setup)
 
@@ -49,16 +57,20 @@ class Worker:
     def fly(self, order: Order) -> None:
         """Give it a point."""
         self.order = order
+        self.heard_s, self.told = time.monotonic(), False
         self._send(order)
 
     def records(self) -> list[Record] | None:
         """Records that came since, of the point it is at; None when it is gone. `nonsense` is set by anything else."""
         data = os.read(self.stdout.fileno(), 1 << 20)
+        self.heard_s, self.told = time.monotonic(), False
         *whole, self._rest = (self._rest + data).split(b"\n")
         found = []
         for line in whole:
             if line == READY:
                 self.ready = True
+                continue
+            if line == ALIVE:
                 continue
             try:
                 record = Record.read(line)
@@ -70,6 +82,14 @@ class Worker:
             self.order = None
             found.append(record)
         return found if data else None
+
+    def is_stopped(self) -> bool:
+        """By a signal: it computes nothing."""
+        try:
+            stat = Path(f"/proc/{self.process.pid}/stat").read_bytes()
+        except OSError:
+            return False
+        return stat.rpartition(b")")[2].split()[:1] in ([b"T"], [b"t"])
 
     def end(self) -> str:
         """Wait for a process that closed its output; returns how it ended."""
@@ -93,9 +113,15 @@ class Worker:
 
 
 class Pool:
-    """`count` workers; orders go in by submit() while there are idle ones, records come out of poll()."""
+    """`count` workers; orders go in by submit() while there are idle ones, records come out of poll().
 
-    def __init__(self, setup: dict[str, Any], count: int, log: Path) -> None:
+    tell: for a line about a worker from which nothing comes.
+    """
+
+    def __init__(
+        self, setup: dict[str, Any], count: int, log: Path, tell: Callable[[str], None] = lambda line: None
+    ) -> None:
+        self._tell = tell
         self._setup, self._log_file = setup, log
         self._log = open(log, "ab")  # noqa: SIM115
         self._selector = selectors.DefaultSelector()
@@ -137,6 +163,27 @@ class Pool:
                 yield from self._gone(worker, f"the worker process was stopped for what it said: {worker.nonsense}")
             elif records is None:
                 yield from self._gone(worker)
+        for worker in list(self._workers):
+            if worker.order is not None:
+                yield from self._look_after(worker)
+
+    def _look_after(self, worker: Worker) -> Iterator[Record]:
+        """A worker that is at a point: is it quiet for too long?"""
+        silent_s = time.monotonic() - worker.heard_s
+        if silent_s < QUIET_S:
+            return
+        assert worker.order is not None
+        stopped = worker.is_stopped()
+        pid = worker.process.pid
+        if silent_s >= GIVE_UP_S:
+            why = "stood still, stopped by a signal" if stopped else "hung: no tick went by"
+            worker.process.kill()
+            yield from self._gone(worker, f"the worker process was killed after {GIVE_UP_S:g} s in which it {why}")
+        elif not worker.told:
+            worker.told = True
+            why = f"it is stopped (kill -CONT {pid} lets it go on)" if stopped else "no tick goes by"
+            left = f"given up after {GIVE_UP_S:g} s"
+            self._tell(f"point {worker.order['point']}: nothing from worker {pid} for {silent_s:.0f} s: {why}; {left}")
 
     def close(self) -> None:
         """End all: idle ones because nothing more comes, busy ones at their next tick; nobody is left behind."""
@@ -161,7 +208,8 @@ class Pool:
         self._workers.remove(worker)
         how = worker.end()
         if not self._began:
-            raise LinkFailure(f"sweep: a worker process ended with {how} before it began; see {self._log_file}")
+            what = why.replace("the worker", "a worker", 1) or f"a worker process ended with {how}"
+            raise LinkFailure(f"sweep: {what} before it began; see {self._log_file}")
         if worker.order is not None:
             yield broken(int(worker.order["point"]), why or f"the worker process ended with {how}")
 

@@ -41,6 +41,12 @@ class Terminal(SweepWatch):
         if record.exit_code:
             self._bad[record.verdict] += 1
 
+    def note(self, line: str) -> None:
+        if self._bar is not None:
+            self._bar.console.print(line, markup=False, highlight=False, soft_wrap=True)
+        else:
+            super().note(line)
+
     def wait(self) -> None:
         if self._bar is not None:
             self._bar.update(self._task, completed=self._flown, refresh=True, bad=self._bad_text(), left=self._left())

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -41,6 +42,10 @@ class SweepWatch:
 
     def record(self, record: Record) -> None:
         """A point is finished."""
+
+    def note(self, line: str) -> None:
+        """Something that somebody should know now; on stderr, whatever else is shown."""
+        print(line, file=sys.stderr, flush=True)
 
     def wait(self) -> None:
         """Called ten times a second."""
@@ -146,7 +151,7 @@ def _fly(
     setup = {"scenario": opened.plan.scenario, "directory": opened.plan.directory}
     orders = iter([_order(point, opened.directory, keep) for point in waiting])
     following = next(orders, None)
-    with Pool(setup, count, opened.directory / results.LOG) as pool:
+    with Pool(setup, count, opened.directory / results.LOG, watch.note) as pool:
         while not stop.asked():
             while following is not None and pool.submit(following):
                 following = next(orders, None)

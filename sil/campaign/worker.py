@@ -1,7 +1,8 @@
 """A worker process of a sweep: `python -m sil.campaign.worker`. Orders come in as lines of JSON, records go out.
 
 First line in: {"scenario", "directory"}; then one {"point", "sets", "folder", "keep"} for each point. First line out:
-{"ready": true}; then a record for each. It ends when nothing more comes in, and it dies with its parent.
+{"ready": true}; then a record for each, and before it {"alive": true} about once a second while ticks go by. It ends
+when nothing more comes in, and it dies with its parent.
 """
 
 from __future__ import annotations
@@ -16,15 +17,18 @@ import sys
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 from sil.campaign.records import Record, broken, record_of, refused
 from sil.runner import run_scenario
 from sil.scenario import load_values
+from sil.signals import Motion
 from sil.sinks.journal import JournalError
 from sil.trouble import EXIT_INTERRUPTED, SilError, UsageError
+from sil.watch import Watch
 
 PR_SET_PDEATHSIG = 1
+ALIVE_EVERY_S = 1.0
 STOPPED = "KeyboardInterrupt: the law raised it, or somebody told the worker to stop"
 
 
@@ -38,20 +42,38 @@ def main() -> None:
         setup = json.loads(sys.stdin.readline() or "null")
         print(json.dumps({"ready": True}), file=records, flush=True)
         while line := sys.stdin.readline():
-            record = fly(setup, json.loads(line))
+            record = fly(setup, json.loads(line), Alive(records))
             print(record.line(), end="", file=records, flush=True)
     except (KeyboardInterrupt, BrokenPipeError):
         return  # the sweep is over
 
 
-def fly(setup: dict[str, Any], order: dict[str, Any]) -> Record:
+class Alive(Watch):
+    """Says on `out` that ticks go by, so that a worker that hangs or was stopped is told apart from one that works."""
+
+    def __init__(self, out: TextIO) -> None:
+        self._out, self._said_s = out, time.monotonic()
+
+    def tick(self, tick: int, ticks: int, motion: Motion) -> None:
+        if time.monotonic() - self._said_s >= ALIVE_EVERY_S:
+            self._say()
+
+    def stage(self, name: str) -> None:
+        self._say()
+
+    def _say(self) -> None:
+        self._said_s = time.monotonic()
+        print(json.dumps({"alive": True}), file=self._out, flush=True)
+
+
+def fly(setup: dict[str, Any], order: dict[str, Any], watch: Watch | None = None) -> Record:
     """One point, from its values to its record; its run directory is deleted unless it is to be kept.
 
     The order's folder ends with .new; the sweep takes that away once the record has arrived.
     """
     folder = Path(order["folder"])
     began = time.perf_counter()
-    record = _flown(setup, order, folder)
+    record = _flown(setup, order, folder, watch)
     reason = record.reason.replace(str(folder), "run directory")  # tables do not depend on where the sweep lies
     record = record._replace(reason=reason, wall_s=round(time.perf_counter() - began, 6))
     if folder.exists() and (order["keep"] == "all" or (order["keep"] == "on-fail" and record.exit_code != 0)):
@@ -64,11 +86,11 @@ def fly(setup: dict[str, Any], order: dict[str, Any]) -> Record:
     return record
 
 
-def _flown(setup: dict[str, Any], order: dict[str, Any], folder: Path) -> Record:
+def _flown(setup: dict[str, Any], order: dict[str, Any], folder: Path, watch: Watch | None) -> Record:
     point = int(order["point"])
     try:
         scenario = load_values(setup["scenario"], order["sets"], "scenario", Path(setup["directory"]))
-        summary = run_scenario(scenario, folder)
+        summary = run_scenario(scenario, folder, watch)
         return broken(point, STOPPED) if summary["exit_code"] == EXIT_INTERRUPTED else record_of(point, summary, 0.0)
     except KeyboardInterrupt:
         return broken(point, STOPPED)

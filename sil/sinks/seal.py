@@ -229,7 +229,10 @@ class _Sealing:
         elif record.kind == Kind.HOST:
             self.timing.host({**content, "sealed_with": {name: version(name) for name in LIBRARIES}})
         else:
-            self._end = {**content, "reason": str(content["reason"]), "ticks": int(content["ticks"])}
+            ticks = int(content["ticks"])
+            if ticks < 0:
+                raise ValueError(f"END: expected a number of ticks, got {ticks}")
+            self._end = {**content, "reason": str(content["reason"]), "ticks": ticks}
 
 
 def _committed(reader: JournalReader) -> Iterator[Record]:

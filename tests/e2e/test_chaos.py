@@ -143,6 +143,26 @@ def test_a_board_that_never_goes_on_is_a_clear_line(cli, kind):
     ended(board)
 
 
+def test_workers_of_a_sweep_that_stood_still_for_a_while_change_nothing(cli):
+    """What is longer than a while is a line, then a failed point: tests/sil/campaign/test_worker.py."""
+    sweep = ("sweep", "pd-root-locus", "--vary", "seed=1:12", "--set", "sensors.attitude.noise_deg=0.01", "-j", "2")
+    cli(*sweep, "--set", "require=[]", "--out", "clean")
+    run = cli.start(*sweep, "--set", "require=[]", "--out", "stopped")
+    flown = cli.folder / "stopped" / "results.jsonl"
+    wait_for(lambda: (flown.exists() and flown.read_bytes().count(b"\n") >= 2) or run.poll() is not None)
+    workers = children_of(run.pid)
+    assert len(workers) == 2
+    for pid in workers:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(STOPPED_s / 3)
+    for pid in workers:
+        os.kill(pid, signal.SIGCONT)
+    _, err = run.communicate(timeout=60)
+    assert run.returncode == 0, err
+    one, two = ((cli.folder / name / "results.csv").read_bytes() for name in ("clean", "stopped"))
+    assert one == two
+
+
 # -- the line torn away ------------------------------------------------------------------------------------------------
 
 

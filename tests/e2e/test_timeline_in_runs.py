@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 
+import numpy as np
 import pytest
 
 from protocol import events
@@ -108,6 +109,18 @@ def test_what_the_log_says(recorded):
     sampled = {row.tick for row in run.packets if row.type == Type.SAMPLE}
     assert sampled == set(range(120)) - set(range(50, 62)) - set(range(81, 93))
     assert "board sessions            3, from ticks 0, 62, 93" in text(info(run))
+
+
+def test_after_a_restart_errors_count_from_the_first_telemetry_on(tmp_path):
+    """Not a number before it, and no requirement fails for that: nobody knows what reference the board had."""
+    every = fly(tmp_path / "every", board="inproc")["metrics"]
+    seldom = fly(tmp_path / "seldom", board="inproc", telemetry_every=5)
+    run = open_run(tmp_path / "seldom")
+    unknown = {tick for tick in range(120) if not np.isfinite(run.reference_deg[tick]).all()}
+    assert unknown >= {62, 63, 64, 93, 94} and not unknown & {*range(10, 62), *range(70, 93), *range(100, 120)}
+    for name in ("rms_error_deg", "peak_error_deg"):
+        assert np.isfinite(seldom["metrics"][name]).all()
+        assert seldom["metrics"][name] == pytest.approx(every[name], rel=0.15)
 
 
 def test_a_set_point_reaches_a_board_that_takes_it_from_the_sample(tmp_path):

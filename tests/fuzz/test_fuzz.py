@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tools.fuzz import CORPUS, IN_C, IN_PYTHON, REPO, load, native
+from tools.fuzz import __main__ as main
 
 SECONDS = 1.0
 
@@ -48,7 +49,7 @@ def test_every_target_runs(tmp_path: Path) -> None:
     assert all(count > 10 for count in tried.values()), tried
 
 
-def test_a_finding_is_kept_and_is_exit_code_1(tmp_path: Path) -> None:
+def test_a_finding_is_kept(tmp_path: Path) -> None:
     """A target whose check always fails, in the place of a real one."""
     broken = (
         "import sys, tools.fuzz, tools.fuzz.worker as worker\n"
@@ -65,3 +66,41 @@ def test_a_finding_is_kept_and_is_exit_code_1(tmp_path: Path) -> None:
     (found,) = tmp_path.glob("stream-????????????")
     assert found.read_bytes() == b"seed"
     assert "as it should be" in found.with_suffix(".txt").read_text()
+
+
+@pytest.mark.parametrize(
+    ("script", "said"), [("exit 77", "exit code 77"), ("echo no sanitizer here >&2; exit 1", "no sanitizer here")]
+)
+@pytest.mark.parametrize("engine", ["libFuzzer", "driver"])
+def test_a_program_that_only_fails_is_a_finding(tmp_path: Path, engine: str, script: str, said: str) -> None:
+    """A fuzzer that could not even start must not pass for ten minutes without a finding."""
+    program = tmp_path / "program"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    ran = native.run(native.Engine(engine, program), "decoder", 1.0, tmp_path / "corpus", tmp_path, lambda line: None)
+    (found,) = ran.findings
+    assert said in found.with_suffix(".txt").read_text()
+    assert main.summary([main.Result("decoder", engine, 1, 1.0, (str(found),))], tmp_path) == 1
+
+
+def test_a_target_that_hangs_in_our_driver_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "SLACK_S", 0.0)
+    program = tmp_path / "program"
+    program.write_text("#!/bin/sh\nexec sleep 600\n")
+    program.chmod(0o755)
+    ran = native.run(native.Engine("driver", program), "decoder", 0.2, tmp_path / "corpus", tmp_path, lambda line: None)
+    assert len(ran.findings) == 1
+
+
+def test_an_artifact_of_an_earlier_run_is_not_told_again(tmp_path: Path) -> None:
+    (tmp_path / "decoder-crash-0123").write_bytes(b"long mended")
+    program = tmp_path / "program"
+    program.write_text("#!/bin/sh\nexit 0\n")
+    program.chmod(0o755)
+    made = native.Engine("libFuzzer", program)
+    assert native.run(made, "decoder", 1.0, tmp_path / "corpus", tmp_path, lambda line: None).findings == []
+
+
+def test_exit_code_0_is_for_targets_that_tried_something_and_found_nothing(tmp_path: Path) -> None:
+    assert main.summary([main.Result("decoder", "driver", 5, 1.0, ())], tmp_path) == 0
+    assert main.summary([main.Result("decoder", "driver", 0, 1.0, ())], tmp_path) == 1

@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
     (given.folder / "findings").mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(max(1, given.jobs)) as pool:
         results = list(pool.map(lambda name: _run(name, given), names))
-    return _summary(results, given.folder)
+    return summary(results, given.folder)
 
 
 def _run(name: str, given: argparse.Namespace) -> Result:
@@ -105,14 +105,18 @@ def _watched(process: subprocess.Popen[bytes], name: str, report: Path, until_s:
         process.wait()
 
 
-def _summary(results: list[Result], folder: Path) -> int:
+def summary(results: list[Result], folder: Path) -> int:
+    """The table; returns the exit code."""
     print(f"\n{'target':<10}{'engine':<24}{'executions':>12}{'per s':>9}{'findings':>10}")
     for name, engine, executions, seconds, findings in results:
         print(f"{name:<10}{engine:<24}{executions:>12}{executions / seconds:>9.0f}{len(findings):>10}")
     for result in results:
         for finding in result.findings:
             print(f"{result.name}: {finding}")
-    found = sum(len(result.findings) for result in results)
+    idle = [result.name for result in results if not result.executions]
+    for name in idle:
+        print(f"{name}: nothing was tried: see {folder / 'findings' / name}")
+    found = sum(len(result.findings) for result in results) + len(idle)
     print(f"corpora and findings: {folder}")
     return 1 if found else 0
 

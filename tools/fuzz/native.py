@@ -7,6 +7,7 @@ import re
 import shutil
 import struct
 import subprocess
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
@@ -21,6 +22,7 @@ SOURCES = Path(__file__).parent / "c"
 CLANGS = ("clang", *(f"clang-{version}" for version in range(22, 11, -1)))
 FLAGS = ("-g", "-O1", "-std=c11", "-Wall", "-Wextra", "-Werror", "-fwrapv", "-fno-sanitize-recover=all")
 LONGEST = 8192
+SLACK_S = 120.0  # for the seeds, and for the input under way; beyond it the input hangs, which our driver does not see
 EXECUTIONS = re.compile(r"(?:stat::number_of_executed_units:|executions) *(\d+)")
 COVERED = re.compile(r"cov: (\d+)")
 
@@ -77,11 +79,14 @@ def run(made: Engine, name: str, seconds: float, corpus: Path, findings: Path, t
     for data in start(name):
         (corpus / hashlib.sha256(data).hexdigest()[:16]).write_bytes(data)
     log = findings / f"{name}.log"
+    before = set(_artifacts(made, name, findings))  # of an earlier run: told then
     command = [str(made.program), *_arguments(made, name, seconds, corpus, findings)]
+    (findings / f"{name}-last").unlink(missing_ok=True)
+    give_up_s = time.monotonic() + seconds + SLACK_S
     with open(log, "wb") as out:
         process = subprocess.Popen(command, stdout=out, stderr=subprocess.STDOUT, env=_environment(name))
         try:
-            while process.poll() is None:
+            while process.poll() is None and time.monotonic() < give_up_s:
                 try:
                     process.wait(5.0)
                 except subprocess.TimeoutExpired:
@@ -91,9 +96,11 @@ def run(made: Engine, name: str, seconds: float, corpus: Path, findings: Path, t
             process.wait()
     said = log.read_text(errors="replace")
     counts = EXECUTIONS.findall(said)
-    found = _crashes(made, name, findings, process.returncode)
+    found = sorted(set(_artifacts(made, name, findings)) - before)
+    if process.returncode and not found:
+        found = [_ended_badly(name, findings)]
     for path in found:
-        path.with_suffix(".txt").write_text(said[-6000:])
+        path.with_suffix(".txt").write_text(f"exit code {process.returncode}\n{said[-6000:]}")
     return Ran(int(counts[-1]) if counts else _last_number(said), int((COVERED.findall(said) or [0])[-1]), found)
 
 
@@ -127,18 +134,21 @@ def _last_number(said: str) -> int:
     return int((re.findall(r"^#(\d+)", said, re.MULTILINE) or [0])[-1])
 
 
-def _crashes(made: Engine, name: str, findings: Path, code: int) -> list[Path]:
-    if made.name == "libFuzzer":
-        kinds = ("crash", "timeout", "oom", "leak")
-        return sorted(path for kind in kinds for path in findings.glob(f"{name}-{kind}-*") if path.suffix != ".txt")
+def _artifacts(made: Engine, name: str, findings: Path) -> list[Path]:
+    """Inputs that libFuzzer kept; our driver keeps none itself."""
+    kinds = ("crash", "timeout", "oom", "leak") if made.name == "libFuzzer" else ()
+    return [path for kind in kinds for path in findings.glob(f"{name}-{kind}-*") if path.suffix != ".txt"]
+
+
+def _ended_badly(name: str, findings: Path) -> Path:
+    """A program that failed is a finding, also where it did not come to an input: an empty one stands for it then."""
     last = findings / f"{name}-last"
-    if code == 0 or not last.exists():
-        return []
-    content = last.read_bytes()
+    content = last.read_bytes() if last.exists() else bytes(4)
     (length,) = struct.unpack_from("<I", content)
-    found = findings / f"{name}-crash-{hashlib.sha256(content[4 : 4 + length]).hexdigest()[:12]}"
-    found.write_bytes(content[4 : 4 + length])
-    return [found]
+    data = content[4 : 4 + length]
+    found = findings / f"{name}-crash-{hashlib.sha256(data).hexdigest()[:12]}"
+    found.write_bytes(data)
+    return found
 
 
 # -- what it starts from ----------------------------------------------------------------------------------------------

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import errno
+import io
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -129,3 +132,55 @@ def test_when_no_worker_can_begin_the_sweep_fails(workers):
     flying.submit({"point": 1})
     with pytest.raises(LinkFailure, match="before it began"):
         records_of(flying, 1)
+
+
+STUCK = READY + "import time; time.sleep(60)"
+ALIVE = READY + "import time; [print('{\"alive\": true}', flush=True) or time.sleep(0.1) for _ in range(12)]; " + (
+    f"print({RECORD.line().strip()!r}, flush=True); sys.stdin.read()"
+)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(pool, "QUIET_S", 0.3)
+    monkeypatch.setattr(pool, "GIVE_UP_S", 0.8)
+
+
+@pytest.mark.parametrize("stopped", [False, True])
+def test_a_worker_that_hangs_or_is_stopped_costs_its_point_and_the_next_one_flies_the_next(workers, impatient, stopped):
+    """A sweep never hangs silently: a line first, then the point has failed."""
+    flying, told = workers(STUCK, GOOD), []
+    flying._tell = told.append
+    flying.submit({"point": 7})
+    while not flying._began:
+        list(flying.poll(0.1))
+    pid = flying._workers[0].process.pid
+    if stopped:
+        os.kill(pid, signal.SIGSTOP)
+    (record,) = records_of(flying, 1)
+    assert (record.point, record.exit_code) == (7, 3)
+    assert "killed after 0.8 s in which it " + ("stood still" if stopped else "hung") in record.reason
+    (line,) = told
+    assert line.startswith(f"point 7: nothing from worker {pid} for ")
+    assert ("kill -CONT" in line) == stopped
+    flying.submit({"point": 1})
+    assert records_of(flying, 1) == [RECORD]
+
+
+def test_a_worker_whose_ticks_go_by_may_take_as_long_as_it_likes(workers, impatient):
+    flying, told = workers(ALIVE), []
+    flying._tell = told.append
+    flying.submit({"point": 1})
+    assert records_of(flying, 1) == [RECORD]
+    assert told == []
+
+
+def test_a_worker_says_that_ticks_go_by(monkeypatch, tmp_path):
+    monkeypatch.setattr(worker, "ALIVE_EVERY_S", 0.0)
+    out = io.StringIO()
+    setup = load_scenario("pd-root-locus", ["board=inproc", "duration_s=10", "require=[]"])
+    setup = {"scenario": setup.resolved(), "directory": ""}
+    order = {"point": 1, "sets": [], "folder": str(tmp_path / "0001.new"), "keep": "none"}
+    assert worker.fly(setup, order, worker.Alive(out)).reason == ""
+    lines = out.getvalue().encode().splitlines()
+    assert set(lines) == {pool.ALIVE} and len(lines) >= 20

@@ -70,6 +70,7 @@ NOT_SEALED: dict[str, tuple[Kind, Change]] = {
     "a period that no clock can count": (Kind.META, with_values(period_ns=2**80)),
     "HOST is a number": (Kind.HOST, lambda payload: b"7"),
     "END without ticks": (Kind.END, lambda payload: b'{"reason": "finished"}'),
+    "END with fewer ticks than none": (Kind.END, with_values(ticks=-6)),  # fuzzing
     "END with ticks in words": (Kind.END, with_values(ticks="many")),
 }
 
