@@ -1,9 +1,11 @@
-"""A design as the `law:` section of a scenario."""
+"""Designs as the `law:` section of a scenario."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+from sil.design.fuzzy import ENTRIES, Inference
+from sil.design.linear import Array
 from sil.design.sheet import MOST_STATES, Sheet
 from sil.trouble import UsageError
 
@@ -32,6 +34,23 @@ def law_section(sheet: Sheet) -> str:
         f"    C: {_row(C.C[0])}",
         f"    D: {_number(C.D[0, 0])}",
         f"    gain: {_row(sheet.inertia)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def fuzzy_section(inference: Inference, table: Array) -> str:
+    """YAML of law fvsc with its table; raises UsageError where the law has no such table."""
+    if table.shape != (ENTRIES,):
+        raise UsageError(f"--yaml, --out: expected one input and {ENTRIES} entries, the table of law fvsc")
+    lines = [
+        f"# Mamdani, min and {inference.aggregation}, exact centroid: -f(e)/L at {ENTRIES} errors from 0 to E.",
+        "law:",
+        "  name: fvsc",
+        "  params:",
+        "    inference: table",
+        f"    E: {_number(inference.ranges[0])}",
+        f"    L: {_number(inference.reach)}",
+        f"    f_table: {_row(table)}",
     ]
     return "\n".join(lines) + "\n"
 

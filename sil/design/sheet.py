@@ -63,7 +63,7 @@ class Sheet(NamedTuple):
         content["margins"] = {name: found._asdict() for name, found in self.margins.items()}
         if self.discrete is not None and self.sampling is not None:
             found = self.bits
-            content["discrete"] = {**self.discrete._asdict(), "order": self.discrete.order, **self.sampling._asdict()}
+            content["discrete"] = {**self.sampling._asdict(), **self.discrete._asdict(), "order": self.discrete.order}
             content["bits"] = found._asdict() if found else None
         return content
 

@@ -273,12 +273,14 @@ def fuzzy(
         typer.Option("--entries", metavar="N", help="Of the table, each way, 3 to 257.", rich_help_panel=DESIGN_PANEL),
     ] = 65,
     as_json: JsonOption = False,
-    out: Annotated[
+    as_yaml: YamlOption = False,
+    out: FileOption = None,
+    csv: Annotated[
         Path | None,
         typer.Option(
-            "--out",
-            metavar="CSV",
-            help="The table into a file: a row a value of the error.",
+            "--csv",
+            metavar="FILE",
+            help="The table into a file: a row for each value of the error.",
             rich_help_panel=RESULT_PANEL,
         ),
     ] = None,
@@ -286,17 +288,21 @@ def fuzzy(
     """A Mamdani controller as a table: triangular sets, exact centroid.
 
     One input: three sets of the error, three of the output, N to H, Z to N, P to L; the table holds -f(e)/L from e = 0
-    to E, and is odd. Its slope at 0 is 0 with ruspini sets: no stiffness where the error is small. With --angle: the
-    nine rules of experiment 1, f/L over error and angle.
+    to E, and is odd: f_table of laws fvsc and ifvsc. Its slope at 0 is 0 with ruspini sets: no stiffness where the
+    error is small. With --angle: the nine rules of experiment 1, f/L over error and angle.
 
     Exit codes: 0 made, 2 usage.
 
     Examples: sil design fuzzy | sil design fuzzy --error 0.386 --aggregation sum --json |
-    sil design fuzzy --error 0.5 --angle 0.5 --entries 33 --out plane.csv
+    sil design fuzzy --error 0.5 --angle 0.5 --entries 33 --csv plane.csv |
+    sil design fuzzy --inputs matlab --outputs matlab --yaml
     """
     from sil.design import fuzzy as sets
+    from sil.design.law_section import fuzzy_section
     from sil.screen.design_sheet import show_fuzzy
 
+    if as_json and as_yaml:
+        raise UsageError("--json, --yaml: expected one of them, got both")
     if not 3 <= entries <= 257:
         raise UsageError(f"--entries: expected 3 to 257, got {entries}")
     E, L = _positive("--error", error), _positive("--output", output)
@@ -308,11 +314,16 @@ def fuzzy(
             raise UsageError("--angle: expected ruspini sets beside it, experiment 1 says no others")
         inference = sets.two_inputs(E, _positive("--angle", angle), L, aggregation)
         table = sets.plane_table(inference, entries)
+    section = fuzzy_section(inference, table) if as_yaml or out is not None else ""
     if out is not None:
+        out.write_text(section, encoding="utf-8")
+    if csv is not None:
         rows = table.reshape(len(table), -1)
-        out.write_text("".join(",".join(f"{value:.9g}" for value in row) + "\n" for row in rows), encoding="utf-8")
+        csv.write_text("".join(",".join(f"{value:.9g}" for value in row) + "\n" for row in rows), encoding="utf-8")
     if as_json:
         print_json({"ranges_rad": inference.ranges, "reach": L, "aggregation": aggregation, "table": table.tolist()})
+    elif as_yaml:
+        print(section, end="")
     else:
         show_fuzzy(inference, table)
     return EXIT_OK

@@ -5,10 +5,14 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from sil.cli import invoke
+from sil.configure import orders
+from sil.design.linear import StateSpace
+from sil.scenario import load_scenario
 
 
 def test_the_table_says_what_was_designed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -46,6 +50,40 @@ def test_json_yaml_file_and_picture(capsys: pytest.CaptureFixture[str], tmp_path
     assert (tmp_path / "page.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_what_the_board_is_told_answers_as_what_was_designed(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """From the section over the scenario to CONFIG's words and back: within the 0.1 % that the bits promise."""
+    command = [
+        "design",
+        "glover",
+        "--wc",
+        "0.25",
+        "--delay",
+        "0.75",
+        "--integral",
+        "0.02",
+        "--inertia",
+        "2,3,4",
+        "--period",
+        "0.5",
+        "--json",
+        "--out",
+    ]
+    assert invoke([*command, str(tmp_path / "law.yaml")]) == 0
+    designed = json.loads(capsys.readouterr().out)["discrete"]
+    values = orders(load_scenario(str(tmp_path / "law.yaml"))).configuration.values
+    n = designed["order"]
+    A = np.array([[values[f"A_{i}_{k}"] for k in range(1, n + 1)] for i in range(1, n + 1)])
+    B, C = (np.array([values[f"{name}_{i}"] for i in range(1, n + 1)]) for name in "BC")
+    told = StateSpace(A, B[:, None], C[None], np.array([[values["D"]]]), 0.5)
+    meant = StateSpace(*(np.array(designed[name]) for name in "ABCD"), 0.5)
+    omega = np.geomspace(1e-2, 6.0, 50)
+    np.testing.assert_allclose(told.response(omega), meant.response(omega), rtol=1e-4)
+    assert [values[f"gain_{axis}"] for axis in "xyz"] == pytest.approx([2, 3, 4], rel=1e-8)
+    assert values["state_bits"] == 28
+
+
 def test_an_unstable_loop_is_said_so_and_a_drifting_one_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
     assert invoke(["design", "printed", "lqg-5.1", "--actuator-gain", "0.01"]) == 1
     assert "UNSTABLE" in capsys.readouterr().out
@@ -67,8 +105,9 @@ def test_an_unstable_loop_is_said_so_and_a_drifting_one_warned_of(capsys: pytest
         ("glover --method euler", "--method: expected one of ramp, zoh, tustin, got euler"),
         ("glover --pade 4 --integral 0.1 --period 0.1 --order 0", "order: expected at least 1"),
         ("fuzzy --entries 2", "--entries: expected 3 to 257"),
+        ("fuzzy --angle 0.5 --yaml", "expected one input and 65 entries"),
         ("fuzzy --inputs gauss", "sets: expected one of ruspini, matlab, got gauss"),
-        ("fuzzy --out /nowhere/table.csv", "/nowhere/table.csv: No such file"),
+        ("fuzzy --csv /nowhere/table.csv", "/nowhere/table.csv: No such file"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments: str, says: str, capsys: pytest.CaptureFixture[str]) -> None:
