@@ -24,6 +24,7 @@ typedef union {
     pd pd;
     mrac mrac;
     appc appc;
+    fvsc fvsc;
     state_space state_space;
 } law_memory;
 

@@ -1,4 +1,4 @@
-"""The control laws: one file each, one line here. A file holds the float reference and the fixed form side by side."""
+"""The control laws: a file for each or for a family, a line for each here; float and fixed form side by side."""
 
 from __future__ import annotations
 
@@ -16,10 +16,13 @@ LAWS: dict[str, str] = {
     "pd": "firmware_sim.controllers.pd:Pd",
     "mrac": "firmware_sim.controllers.mrac:Mrac",
     "appc": "firmware_sim.controllers.appc:Appc",
+    "fvsc": "firmware_sim.controllers.fvsc:Fvsc",
+    "vsc": "firmware_sim.controllers.fvsc:Vsc",
+    "ifvsc": "firmware_sim.controllers.fvsc:Ifvsc",
     "state_space": "firmware_sim.controllers.state_space:StateSpace",
 }
 # Files of this folder that are not laws.
-SUPPORT = ("attitude_error", "compiled", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")
+SUPPORT = ("attitude_error", "compiled", "fuzzy", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")
 
 
 class Law(Protocol):

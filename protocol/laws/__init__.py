@@ -1,4 +1,4 @@
-"""The words of the control laws: one file each, one line here. The laws themselves are in firmware_sim/controllers/.
+"""The words of the control laws of firmware_sim/controllers/: a file for each or for a family, a line for each here.
 
 In the order of their ids, which the tables of the firmware and of SPEC.md keep.
 """
@@ -14,10 +14,13 @@ LAWS: dict[str, str] = {
     "pd": "protocol.laws.pd:PD",
     "mrac": "protocol.laws.mrac:MRAC",
     "appc": "protocol.laws.appc:APPC",
+    "fvsc": "protocol.laws.fvsc:FVSC",
+    "vsc": "protocol.laws.fvsc:VSC",
+    "ifvsc": "protocol.laws.fvsc:IFVSC",
     "state_space": "protocol.laws.state_space:STATE_SPACE",
 }
 # Those that the C firmware has; to the others a board that runs it answers READY with status 2, unknown law.
-IN_C = ("pd", "mrac", "appc", "state_space")
+IN_C = ("pd", "mrac", "appc", "fvsc", "vsc", "ifvsc", "state_space")
 
 
 def tables() -> Iterator[LawTable]:

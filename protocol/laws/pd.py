@@ -25,6 +25,7 @@ PD = LawTable(
     period_s=(0.001, 10.0),
     reference_leads=(2, 1),
     needs=READ_EULER,
+    has_model=False,
     variant_word="rate",
     variants=(
         Variant((0, 1, 2, 3, 4), (2, 1)),

@@ -36,6 +36,7 @@ STATE_SPACE = LawTable(
     period_s=(0.001, 10.0),
     reference_leads=(2, 1),
     needs=READ_EULER,
+    has_model=False,
     arrays={"A": ("n", "n"), "B": ("n",), "C": ("n",)},
     sizes={"n": ORDER},
 )

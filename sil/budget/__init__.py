@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 # What a law in C is measured with, and what is set in it; a law of many sizes with its largest.
-SCENARIOS = {"pd": "pd-root-locus", "appc": "appc-rs232", "mrac": "mrac-rs232", "state_space": "pd-root-locus"}
+SCENARIOS = {"pd": "pd-root-locus", "appc": "appc-rs232", "mrac": "mrac-rs232", "fvsc": "fvsc-rs232",
+             "state_space": "pd-root-locus"}  # fmt: skip
 _LQG = [[0.44866, 0.5, 0.125], [-0.23829, 1.0, 0.5], [-0.157, -0.63885, -0.2998]]
 _ORDER_8 = [[*row, *[0.0] * 5] for row in _LQG] + [[0.0] * n + [0.5] + [0.0] * (7 - n) for n in range(3, 8)]
 SETS = {

@@ -11,7 +11,7 @@ from sil.budget.measure import COUNTED, Budget
 from sil.trouble import UsageError
 
 GROWTH = 0.02
-LAW_STEP_MOST = {"pd": 5_000, "appc": 20_000, "mrac": 40_000, "state_space": 10_000}  # instructions
+LAW_STEP_MOST = {"pd": 5_000, "appc": 20_000, "mrac": 40_000, "fvsc": 10_000, "state_space": 10_000}  # instructions
 STACK_MOST, CODE_MOST = 2048, 32 * 1024  # bytes
 JUDGED = ("mean", "max")  # of the instructions; the least is nobody's trouble
 

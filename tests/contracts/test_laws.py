@@ -181,7 +181,7 @@ def test_tables_fit_the_frames_and_the_interface(name: str) -> None:
     table = law_by_name(name)
     assert len(TELEMETRY_COMMON) + len(table.telemetry) <= MAX_TELEMETRY_WORDS
     law = Rig(name, "fixed", {}).law
-    assert isinstance(law, CompiledLaw) and isinstance(law.has_model, bool)
+    assert isinstance(law, CompiledLaw) and law.has_model == table.has_model
     assert len(law.telemetry()) == len(table.telemetry)
     assert all(field.width in (32, 64) and field.length > 0 for field in law.STATE)
     assert len({field.name for field in law.STATE}) == len(law.STATE)

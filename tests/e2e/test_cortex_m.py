@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 from subprocesses import REPO, Cli, alive, children_of, quiet
 
+from protocol.laws import IN_C
 from sil import open_run
 from sil.replay import replay
 from sil.runner import run_scenario
@@ -83,7 +84,7 @@ def test_replay_finds_another_parameter(recorded: Path) -> None:
         ({"law.form": "float"}, "law.form: expected fixed for board cortex-m, the firmware's arithmetic"),
         ({"clock": "realtime"}, "expected lockstep for board cortex-m, which has no timer of its own"),
         ({"link": "inproc"}, "expected pty or udp for board cortex-m, a process of this machine, got 'inproc'"),
-        ({"law.name": "./mine.py:Mine"}, "expected appc, mrac, pd for board cortex-m, the laws in C"),
+        ({"law.name": "./mine.py:Mine"}, f"expected {', '.join(sorted(IN_C))} for board cortex-m, the laws in C"),
     ],
 )
 def test_what_the_firmware_does_not_fly(cli: Cli, sets: dict[str, str], says: str) -> None:

@@ -160,6 +160,45 @@ typedef struct appc {
 } appc;
 
 typedef struct {
+    int32_t ka[3];          /* the wire's LSB per V Q20: mantissa of ka_shift */
+    int32_t limit[3];       /* N m in the wire's LSB */
+    int32_t ka_shift;       /* bit */
+    int32_t ks;             /* V Q20 */
+    int32_t kr;             /* V s/rad Q20 */
+    int32_t m;              /* 1/s Q24 */
+    int32_t ki;             /* V/(rad s) Q20 */
+    int32_t integral_limit; /* rad s Q20 */
+    int32_t ts;             /* s Q24 */
+    int32_t period_us;      /* us */
+    int32_t rate_bits;      /* bit */
+    int32_t difference;
+    int32_t kind;
+    int32_t sequence;
+    int32_t gain;
+    int32_t inverse_E;      /* 1/rad Q21 */
+    int32_t table[65];      /* 1 Q15 */
+    int32_t reserved;       /* zero */
+} fvsc_par;
+
+typedef struct {
+    int64_t sum[3];       /* rad s Q40 */
+    int32_t error[3];     /* rad Q29 */
+    int32_t switching[3]; /* V Q20 */
+    int32_t sign[3];
+    int32_t integral[3];  /* rad s Q20 */
+    int32_t command[3];   /* N m in the wire's LSB */
+    int32_t gap;          /* tick */
+    int32_t arithmetic;
+    int32_t reserved;     /* zero */
+} fvsc_state;
+
+/* the laws fvsc, vsc and ifvsc, controllers/fvsc.py */
+typedef struct fvsc {
+    fvsc_par par;
+    fvsc_state state;
+} fvsc;
+
+typedef struct {
     int32_t A[64];       /* state Q(state_bits + 16) per state Q(state_bits), less I: mantissa of A_shift */
     int32_t B[8];        /* state Q(state_bits + 16) per rad Q29: mantissa of B_shift */
     int32_t C[24];       /* torque LSB per state Q(state_bits): mantissa of C_shift */
@@ -195,6 +234,7 @@ _Static_assert(sizeof(reference) == 184, "padding in reference");
 _Static_assert(sizeof(pd) == 128, "padding in pd");
 _Static_assert(sizeof(mrac) == 672, "padding in mrac");
 _Static_assert(sizeof(appc) == 352, "padding in appc");
+_Static_assert(sizeof(fvsc) == 440, "padding in fvsc");
 _Static_assert(sizeof(state_space) == 776, "padding in state_space");
 
 #endif

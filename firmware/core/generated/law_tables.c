@@ -6,6 +6,7 @@ const range_scale RANGE_SCALES[] = {
     {4835703278458517, 4503599627370496, -82, 0, 10}, /* torque_bits: -1e-09 to inf */
     {8589934600589943, 8589934600589943, -33, -33, 26}, /* kp_bits: -1000000.001 to 1000000.001 */
     {8589934600589943, 8589934600589943, -33, -33, 27}, /* kd_bits: -1000000.001 to 1000000.001 */
+    {4835703278458517, 8589934592000009, -82, -33, 26}, /* ka_bits: -1e-09 to 1000000 */
     {8589934600589943, 8589934600589943, -33, -33, 33}, /* axis_gain_bits: -1000000.001 to 1000000.001 */
     {8796093031012889, 8796093031012889, -43, -43, 29}, /* A_bits: -1000.000001 to 1000.000001 */
     {8589934600589943, 8589934600589943, -33, -33, 30}, /* B_bits: -1000000.001 to 1000000.001 */
@@ -86,6 +87,180 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
     {-274, 1924145623, NO_WORD}, /* orbit_rate_radps */
 };
 
+static const word_range FVSC_RANGES[FVSC_WORDS] = {
+    {10, 45, NO_WORD}, /* ka_bits */
+    {0, 1, NO_WORD}, /* error */
+    {0, 1, NO_WORD}, /* rate_in_S */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_x */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_y */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_z */
+    {0, 2097152000, NO_WORD}, /* Ks */
+    {0, 2097152000, NO_WORD}, /* Kr */
+    {0, 1677721600, NO_WORD}, /* m */
+    {0, 1, NO_WORD}, /* inference */
+    {524288, 858993459, NO_WORD}, /* E */
+    {1024, 1048576, NO_WORD}, /* L */
+    {-32768, 32768, NO_WORD}, /* f_table_1 */
+    {-32768, 32768, NO_WORD}, /* f_table_2 */
+    {-32768, 32768, NO_WORD}, /* f_table_3 */
+    {-32768, 32768, NO_WORD}, /* f_table_4 */
+    {-32768, 32768, NO_WORD}, /* f_table_5 */
+    {-32768, 32768, NO_WORD}, /* f_table_6 */
+    {-32768, 32768, NO_WORD}, /* f_table_7 */
+    {-32768, 32768, NO_WORD}, /* f_table_8 */
+    {-32768, 32768, NO_WORD}, /* f_table_9 */
+    {-32768, 32768, NO_WORD}, /* f_table_10 */
+    {-32768, 32768, NO_WORD}, /* f_table_11 */
+    {-32768, 32768, NO_WORD}, /* f_table_12 */
+    {-32768, 32768, NO_WORD}, /* f_table_13 */
+    {-32768, 32768, NO_WORD}, /* f_table_14 */
+    {-32768, 32768, NO_WORD}, /* f_table_15 */
+    {-32768, 32768, NO_WORD}, /* f_table_16 */
+    {-32768, 32768, NO_WORD}, /* f_table_17 */
+    {-32768, 32768, NO_WORD}, /* f_table_18 */
+    {-32768, 32768, NO_WORD}, /* f_table_19 */
+    {-32768, 32768, NO_WORD}, /* f_table_20 */
+    {-32768, 32768, NO_WORD}, /* f_table_21 */
+    {-32768, 32768, NO_WORD}, /* f_table_22 */
+    {-32768, 32768, NO_WORD}, /* f_table_23 */
+    {-32768, 32768, NO_WORD}, /* f_table_24 */
+    {-32768, 32768, NO_WORD}, /* f_table_25 */
+    {-32768, 32768, NO_WORD}, /* f_table_26 */
+    {-32768, 32768, NO_WORD}, /* f_table_27 */
+    {-32768, 32768, NO_WORD}, /* f_table_28 */
+    {-32768, 32768, NO_WORD}, /* f_table_29 */
+    {-32768, 32768, NO_WORD}, /* f_table_30 */
+    {-32768, 32768, NO_WORD}, /* f_table_31 */
+    {-32768, 32768, NO_WORD}, /* f_table_32 */
+    {-32768, 32768, NO_WORD}, /* f_table_33 */
+    {-32768, 32768, NO_WORD}, /* f_table_34 */
+    {-32768, 32768, NO_WORD}, /* f_table_35 */
+    {-32768, 32768, NO_WORD}, /* f_table_36 */
+    {-32768, 32768, NO_WORD}, /* f_table_37 */
+    {-32768, 32768, NO_WORD}, /* f_table_38 */
+    {-32768, 32768, NO_WORD}, /* f_table_39 */
+    {-32768, 32768, NO_WORD}, /* f_table_40 */
+    {-32768, 32768, NO_WORD}, /* f_table_41 */
+    {-32768, 32768, NO_WORD}, /* f_table_42 */
+    {-32768, 32768, NO_WORD}, /* f_table_43 */
+    {-32768, 32768, NO_WORD}, /* f_table_44 */
+    {-32768, 32768, NO_WORD}, /* f_table_45 */
+    {-32768, 32768, NO_WORD}, /* f_table_46 */
+    {-32768, 32768, NO_WORD}, /* f_table_47 */
+    {-32768, 32768, NO_WORD}, /* f_table_48 */
+    {-32768, 32768, NO_WORD}, /* f_table_49 */
+    {-32768, 32768, NO_WORD}, /* f_table_50 */
+    {-32768, 32768, NO_WORD}, /* f_table_51 */
+    {-32768, 32768, NO_WORD}, /* f_table_52 */
+    {-32768, 32768, NO_WORD}, /* f_table_53 */
+    {-32768, 32768, NO_WORD}, /* f_table_54 */
+    {-32768, 32768, NO_WORD}, /* f_table_55 */
+    {-32768, 32768, NO_WORD}, /* f_table_56 */
+    {-32768, 32768, NO_WORD}, /* f_table_57 */
+    {-32768, 32768, NO_WORD}, /* f_table_58 */
+    {-32768, 32768, NO_WORD}, /* f_table_59 */
+    {-32768, 32768, NO_WORD}, /* f_table_60 */
+    {-32768, 32768, NO_WORD}, /* f_table_61 */
+    {-32768, 32768, NO_WORD}, /* f_table_62 */
+    {-32768, 32768, NO_WORD}, /* f_table_63 */
+    {-32768, 32768, NO_WORD}, /* f_table_64 */
+    {-32768, 32768, NO_WORD}, /* f_table_65 */
+};
+
+static const word_range VSC_RANGES[VSC_WORDS] = {
+    {10, 45, NO_WORD}, /* ka_bits */
+    {0, 1, NO_WORD}, /* error */
+    {0, 1, NO_WORD}, /* rate_in_S */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_x */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_y */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_z */
+    {0, 2097152000, NO_WORD}, /* Ks */
+    {0, 2097152000, NO_WORD}, /* Kr */
+    {0, 1677721600, NO_WORD}, /* m */
+};
+
+static const word_range IFVSC_RANGES[IFVSC_WORDS] = {
+    {10, 45, NO_WORD}, /* ka_bits */
+    {0, 1, NO_WORD}, /* error */
+    {0, 1, NO_WORD}, /* rate_in_S */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_x */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_y */
+    {INT32_MIN, INT32_MAX, 3}, /* ka_z */
+    {0, 2097152000, NO_WORD}, /* Ks */
+    {0, 2097152000, NO_WORD}, /* Kr */
+    {0, 1677721600, NO_WORD}, /* m */
+    {0, 1, NO_WORD}, /* inference */
+    {524288, 858993459, NO_WORD}, /* E */
+    {1024, 1048576, NO_WORD}, /* L */
+    {-32768, 32768, NO_WORD}, /* f_table_1 */
+    {-32768, 32768, NO_WORD}, /* f_table_2 */
+    {-32768, 32768, NO_WORD}, /* f_table_3 */
+    {-32768, 32768, NO_WORD}, /* f_table_4 */
+    {-32768, 32768, NO_WORD}, /* f_table_5 */
+    {-32768, 32768, NO_WORD}, /* f_table_6 */
+    {-32768, 32768, NO_WORD}, /* f_table_7 */
+    {-32768, 32768, NO_WORD}, /* f_table_8 */
+    {-32768, 32768, NO_WORD}, /* f_table_9 */
+    {-32768, 32768, NO_WORD}, /* f_table_10 */
+    {-32768, 32768, NO_WORD}, /* f_table_11 */
+    {-32768, 32768, NO_WORD}, /* f_table_12 */
+    {-32768, 32768, NO_WORD}, /* f_table_13 */
+    {-32768, 32768, NO_WORD}, /* f_table_14 */
+    {-32768, 32768, NO_WORD}, /* f_table_15 */
+    {-32768, 32768, NO_WORD}, /* f_table_16 */
+    {-32768, 32768, NO_WORD}, /* f_table_17 */
+    {-32768, 32768, NO_WORD}, /* f_table_18 */
+    {-32768, 32768, NO_WORD}, /* f_table_19 */
+    {-32768, 32768, NO_WORD}, /* f_table_20 */
+    {-32768, 32768, NO_WORD}, /* f_table_21 */
+    {-32768, 32768, NO_WORD}, /* f_table_22 */
+    {-32768, 32768, NO_WORD}, /* f_table_23 */
+    {-32768, 32768, NO_WORD}, /* f_table_24 */
+    {-32768, 32768, NO_WORD}, /* f_table_25 */
+    {-32768, 32768, NO_WORD}, /* f_table_26 */
+    {-32768, 32768, NO_WORD}, /* f_table_27 */
+    {-32768, 32768, NO_WORD}, /* f_table_28 */
+    {-32768, 32768, NO_WORD}, /* f_table_29 */
+    {-32768, 32768, NO_WORD}, /* f_table_30 */
+    {-32768, 32768, NO_WORD}, /* f_table_31 */
+    {-32768, 32768, NO_WORD}, /* f_table_32 */
+    {-32768, 32768, NO_WORD}, /* f_table_33 */
+    {-32768, 32768, NO_WORD}, /* f_table_34 */
+    {-32768, 32768, NO_WORD}, /* f_table_35 */
+    {-32768, 32768, NO_WORD}, /* f_table_36 */
+    {-32768, 32768, NO_WORD}, /* f_table_37 */
+    {-32768, 32768, NO_WORD}, /* f_table_38 */
+    {-32768, 32768, NO_WORD}, /* f_table_39 */
+    {-32768, 32768, NO_WORD}, /* f_table_40 */
+    {-32768, 32768, NO_WORD}, /* f_table_41 */
+    {-32768, 32768, NO_WORD}, /* f_table_42 */
+    {-32768, 32768, NO_WORD}, /* f_table_43 */
+    {-32768, 32768, NO_WORD}, /* f_table_44 */
+    {-32768, 32768, NO_WORD}, /* f_table_45 */
+    {-32768, 32768, NO_WORD}, /* f_table_46 */
+    {-32768, 32768, NO_WORD}, /* f_table_47 */
+    {-32768, 32768, NO_WORD}, /* f_table_48 */
+    {-32768, 32768, NO_WORD}, /* f_table_49 */
+    {-32768, 32768, NO_WORD}, /* f_table_50 */
+    {-32768, 32768, NO_WORD}, /* f_table_51 */
+    {-32768, 32768, NO_WORD}, /* f_table_52 */
+    {-32768, 32768, NO_WORD}, /* f_table_53 */
+    {-32768, 32768, NO_WORD}, /* f_table_54 */
+    {-32768, 32768, NO_WORD}, /* f_table_55 */
+    {-32768, 32768, NO_WORD}, /* f_table_56 */
+    {-32768, 32768, NO_WORD}, /* f_table_57 */
+    {-32768, 32768, NO_WORD}, /* f_table_58 */
+    {-32768, 32768, NO_WORD}, /* f_table_59 */
+    {-32768, 32768, NO_WORD}, /* f_table_60 */
+    {-32768, 32768, NO_WORD}, /* f_table_61 */
+    {-32768, 32768, NO_WORD}, /* f_table_62 */
+    {-32768, 32768, NO_WORD}, /* f_table_63 */
+    {-32768, 32768, NO_WORD}, /* f_table_64 */
+    {-32768, 32768, NO_WORD}, /* f_table_65 */
+    {0, 2097152000, NO_WORD}, /* Ki */
+    {0, 2097152000, NO_WORD}, /* integral_limit */
+};
+
 static const word_range STATE_SPACE_RANGES[STATE_SPACE_WORDS] = {
     {0, 1, NO_WORD}, /* error */
     {0, 1, NO_WORD}, /* anti_windup */
@@ -95,95 +270,98 @@ static const word_range STATE_SPACE_RANGES[STATE_SPACE_WORDS] = {
     {0, 45, NO_WORD}, /* C_bits */
     {0, 45, NO_WORD}, /* D_bits */
     {0, 45, NO_WORD}, /* axis_gain_bits */
-    {INT32_MIN, INT32_MAX, 3}, /* gain_x */
-    {INT32_MIN, INT32_MAX, 3}, /* gain_y */
-    {INT32_MIN, INT32_MAX, 3}, /* gain_z */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_1_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_2_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_3_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_4_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_5_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_6_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_7_8 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_1 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_2 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_3 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_4 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_5 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_6 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_7 */
-    {INT32_MIN, INT32_MAX, 4}, /* A_8_8 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_1 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_2 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_3 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_4 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_5 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_6 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_7 */
-    {INT32_MIN, INT32_MAX, 5}, /* B_8 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_1 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_2 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_3 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_4 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_5 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_6 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_7 */
-    {INT32_MIN, INT32_MAX, 6}, /* C_8 */
-    {INT32_MIN, INT32_MAX, 7}, /* D */
+    {INT32_MIN, INT32_MAX, 4}, /* gain_x */
+    {INT32_MIN, INT32_MAX, 4}, /* gain_y */
+    {INT32_MIN, INT32_MAX, 4}, /* gain_z */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_1_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_2_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_3_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_4_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_5_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_6_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_7_8 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_1 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_2 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_3 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_4 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_5 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_6 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_7 */
+    {INT32_MIN, INT32_MAX, 5}, /* A_8_8 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_1 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_2 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_3 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_4 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_5 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_6 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_7 */
+    {INT32_MIN, INT32_MAX, 6}, /* B_8 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_1 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_2 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_3 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_4 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_5 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_6 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_7 */
+    {INT32_MIN, INT32_MAX, 7}, /* C_8 */
+    {INT32_MIN, INT32_MAX, 8}, /* D */
 };
 
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
     {1, 2, 0x72A0703C, PD_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}, {0x1F, 0x06, 5}}, PD_WORDS, 8, NO_WORD, NO_WORD}, /* pd */
     {2, 1, 0x5C9EFFBA, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02, 1}, {0x02, 0x04, 1}}, MRAC_WORDS, 0, 4, 32}, /* mrac */
     {3, 1, 0x2A4D5A9F, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
+    {4, 1, 0x3691E8F1, FVSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, FVSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* fvsc */
+    {5, 1, 0x6AA34574, VSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, VSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* vsc */
+    {6, 1, 0x3B3D5554, IFVSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, IFVSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* ifvsc */
     {7, 1, 0x590BF8AE, STATE_SPACE_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}}, STATE_SPACE_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* state_space */
 };

@@ -9,6 +9,9 @@
 enum { PD_LAW_ID = 1, PD_LAW_VERSION = 2 };
 enum { MRAC_LAW_ID = 2, MRAC_LAW_VERSION = 1 };
 enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 1 };
+enum { FVSC_LAW_ID = 4, FVSC_LAW_VERSION = 1 };
+enum { VSC_LAW_ID = 5, VSC_LAW_VERSION = 1 };
+enum { IFVSC_LAW_ID = 6, IFVSC_LAW_VERSION = 1 };
 enum { STATE_SPACE_LAW_ID = 7, STATE_SPACE_LAW_VERSION = 1 };
 
 /* CONFIG, common words. */
@@ -90,6 +93,186 @@ enum {
     APPC_INERTIA_KGM2_Z = 6,      /* 2^-26 kg m^2: principal inertia the law believes in, z */
     APPC_ORBIT_RATE_RADPS = 7,    /* 2^-38 rad/s: orbital rate w0, used with gyro */
     APPC_WORDS = 8
+};
+
+/* CONFIG words of fvsc, from the law's first. */
+enum {
+    FVSC_KA_BITS = 0,       /* fractional bits of ka */
+    FVSC_ERROR = 1,         /* attitude error: difference of the Euler angles, or in body axes */
+    FVSC_RATE_IN_S = 2,     /* rate in the switching function: sensor, or change of the error */
+    FVSC_KA_X = 3,          /* 2^-ka_bits N m/V: actuator gain, x */
+    FVSC_KA_Y = 4,          /* 2^-ka_bits N m/V: actuator gain, y */
+    FVSC_KA_Z = 5,          /* 2^-ka_bits N m/V: actuator gain, z */
+    FVSC_KS = 6,            /* 2^-20 V: switching gain */
+    FVSC_KR = 7,            /* 2^-20 V s/rad: damping, on the sensed rate */
+    FVSC_M = 8,             /* 2^-24 1/s: slope of the switching line m e + w = 0 */
+    FVSC_INFERENCE = 9,     /* f by its closed form, or by f_table */
+    FVSC_E = 10,            /* 2^-28 rad: peak of the outer input sets: |f| is largest from here on */
+    FVSC_L = 11,            /* 2^-20: peak of the outer output sets, in switching gains */
+    FVSC_F_TABLE_1 = 12,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_2 = 13,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_3 = 14,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_4 = 15,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_5 = 16,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_6 = 17,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_7 = 18,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_8 = 19,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_9 = 20,    /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_10 = 21,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_11 = 22,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_12 = 23,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_13 = 24,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_14 = 25,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_15 = 26,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_16 = 27,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_17 = 28,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_18 = 29,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_19 = 30,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_20 = 31,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_21 = 32,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_22 = 33,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_23 = 34,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_24 = 35,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_25 = 36,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_26 = 37,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_27 = 38,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_28 = 39,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_29 = 40,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_30 = 41,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_31 = 42,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_32 = 43,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_33 = 44,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_34 = 45,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_35 = 46,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_36 = 47,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_37 = 48,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_38 = 49,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_39 = 50,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_40 = 51,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_41 = 52,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_42 = 53,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_43 = 54,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_44 = 55,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_45 = 56,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_46 = 57,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_47 = 58,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_48 = 59,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_49 = 60,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_50 = 61,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_51 = 62,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_52 = 63,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_53 = 64,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_54 = 65,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_55 = 66,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_56 = 67,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_57 = 68,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_58 = 69,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_59 = 70,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_60 = 71,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_61 = 72,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_62 = 73,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_63 = 74,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_64 = 75,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_F_TABLE_65 = 76,   /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    FVSC_WORDS = 77
+};
+
+/* CONFIG words of vsc, from the law's first. */
+enum {
+    VSC_KA_BITS = 0,      /* fractional bits of ka */
+    VSC_ERROR = 1,        /* attitude error: difference of the Euler angles, or in body axes */
+    VSC_RATE_IN_S = 2,    /* rate in the switching function: sensor, or change of the error */
+    VSC_KA_X = 3,         /* 2^-ka_bits N m/V: actuator gain, x */
+    VSC_KA_Y = 4,         /* 2^-ka_bits N m/V: actuator gain, y */
+    VSC_KA_Z = 5,         /* 2^-ka_bits N m/V: actuator gain, z */
+    VSC_KS = 6,           /* 2^-20 V/rad: switching gain */
+    VSC_KR = 7,           /* 2^-20 V s/rad: damping, on the sensed rate */
+    VSC_M = 8,            /* 2^-24 1/s: slope of the switching line m e + w = 0 */
+    VSC_WORDS = 9
+};
+
+/* CONFIG words of ifvsc, from the law's first. */
+enum {
+    IFVSC_KA_BITS = 0,           /* fractional bits of ka */
+    IFVSC_ERROR = 1,             /* attitude error: difference of the Euler angles, or in body axes */
+    IFVSC_RATE_IN_S = 2,         /* rate in the switching function: sensor, or change of the error */
+    IFVSC_KA_X = 3,              /* 2^-ka_bits N m/V: actuator gain, x */
+    IFVSC_KA_Y = 4,              /* 2^-ka_bits N m/V: actuator gain, y */
+    IFVSC_KA_Z = 5,              /* 2^-ka_bits N m/V: actuator gain, z */
+    IFVSC_KS = 6,                /* 2^-20 V: switching gain */
+    IFVSC_KR = 7,                /* 2^-20 V s/rad: damping, on the sensed rate */
+    IFVSC_M = 8,                 /* 2^-24 1/s: slope of the switching line m e + w = 0 */
+    IFVSC_INFERENCE = 9,         /* f by its closed form, or by f_table */
+    IFVSC_E = 10,                /* 2^-28 rad: peak of the outer input sets: |f| is largest from here on */
+    IFVSC_L = 11,                /* 2^-20: peak of the outer output sets, in switching gains */
+    IFVSC_F_TABLE_1 = 12,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_2 = 13,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_3 = 14,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_4 = 15,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_5 = 16,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_6 = 17,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_7 = 18,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_8 = 19,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_9 = 20,        /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_10 = 21,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_11 = 22,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_12 = 23,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_13 = 24,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_14 = 25,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_15 = 26,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_16 = 27,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_17 = 28,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_18 = 29,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_19 = 30,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_20 = 31,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_21 = 32,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_22 = 33,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_23 = 34,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_24 = 35,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_25 = 36,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_26 = 37,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_27 = 38,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_28 = 39,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_29 = 40,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_30 = 41,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_31 = 42,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_32 = 43,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_33 = 44,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_34 = 45,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_35 = 46,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_36 = 47,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_37 = 48,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_38 = 49,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_39 = 50,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_40 = 51,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_41 = 52,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_42 = 53,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_43 = 54,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_44 = 55,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_45 = 56,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_46 = 57,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_47 = 58,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_48 = 59,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_49 = 60,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_50 = 61,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_51 = 62,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_52 = 63,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_53 = 64,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_54 = 65,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_55 = 66,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_56 = 67,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_57 = 68,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_58 = 69,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_59 = 70,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_60 = 71,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_61 = 72,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_62 = 73,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_63 = 74,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_64 = 75,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_F_TABLE_65 = 76,       /* 2^-15: -f(e)/L at 65 errors from 0 to E */
+    IFVSC_KI = 77,               /* 2^-20 V/(rad s): gain of the integral of the error */
+    IFVSC_INTEGRAL_LIMIT = 78,   /* 2^-20 rad s: limit of the integral */
+    IFVSC_WORDS = 79
 };
 
 /* CONFIG words of state_space, from the law's first. */
@@ -255,6 +438,51 @@ enum {
     APPC_TELEMETRY_WORDS = 12
 };
 
+/* TELEMETRY words of fvsc, from the law's first. */
+enum {
+    FVSC_TELEMETRY_ERROR_X = 0,        /* 2^-29 rad: e: measured minus reference, x */
+    FVSC_TELEMETRY_ERROR_Y = 1,        /* 2^-29 rad: e: measured minus reference, y */
+    FVSC_TELEMETRY_ERROR_Z = 2,        /* 2^-29 rad: e: measured minus reference, z */
+    FVSC_TELEMETRY_SWITCHING_X = 3,    /* 2^-20 V: Ks sgn(S) f(e), x */
+    FVSC_TELEMETRY_SWITCHING_Y = 4,    /* 2^-20 V: Ks sgn(S) f(e), y */
+    FVSC_TELEMETRY_SWITCHING_Z = 5,    /* 2^-20 V: Ks sgn(S) f(e), z */
+    FVSC_TELEMETRY_SIGN_X = 6,         /* sgn(S), x */
+    FVSC_TELEMETRY_SIGN_Y = 7,         /* sgn(S), y */
+    FVSC_TELEMETRY_SIGN_Z = 8,         /* sgn(S), z */
+    FVSC_TELEMETRY_WORDS = 9
+};
+
+/* TELEMETRY words of vsc, from the law's first. */
+enum {
+    VSC_TELEMETRY_ERROR_X = 0,        /* 2^-29 rad: e: measured minus reference, x */
+    VSC_TELEMETRY_ERROR_Y = 1,        /* 2^-29 rad: e: measured minus reference, y */
+    VSC_TELEMETRY_ERROR_Z = 2,        /* 2^-29 rad: e: measured minus reference, z */
+    VSC_TELEMETRY_SWITCHING_X = 3,    /* 2^-20 V: Ks sgn(S) f(e), x */
+    VSC_TELEMETRY_SWITCHING_Y = 4,    /* 2^-20 V: Ks sgn(S) f(e), y */
+    VSC_TELEMETRY_SWITCHING_Z = 5,    /* 2^-20 V: Ks sgn(S) f(e), z */
+    VSC_TELEMETRY_SIGN_X = 6,         /* sgn(S), x */
+    VSC_TELEMETRY_SIGN_Y = 7,         /* sgn(S), y */
+    VSC_TELEMETRY_SIGN_Z = 8,         /* sgn(S), z */
+    VSC_TELEMETRY_WORDS = 9
+};
+
+/* TELEMETRY words of ifvsc, from the law's first. */
+enum {
+    IFVSC_TELEMETRY_ERROR_X = 0,        /* 2^-29 rad: e: measured minus reference, x */
+    IFVSC_TELEMETRY_ERROR_Y = 1,        /* 2^-29 rad: e: measured minus reference, y */
+    IFVSC_TELEMETRY_ERROR_Z = 2,        /* 2^-29 rad: e: measured minus reference, z */
+    IFVSC_TELEMETRY_SWITCHING_X = 3,    /* 2^-20 V: Ks sgn(S) f(e), x */
+    IFVSC_TELEMETRY_SWITCHING_Y = 4,    /* 2^-20 V: Ks sgn(S) f(e), y */
+    IFVSC_TELEMETRY_SWITCHING_Z = 5,    /* 2^-20 V: Ks sgn(S) f(e), z */
+    IFVSC_TELEMETRY_SIGN_X = 6,         /* sgn(S), x */
+    IFVSC_TELEMETRY_SIGN_Y = 7,         /* sgn(S), y */
+    IFVSC_TELEMETRY_SIGN_Z = 8,         /* sgn(S), z */
+    IFVSC_TELEMETRY_INTEGRAL_X = 9,     /* 2^-20 rad s: integral of e, x */
+    IFVSC_TELEMETRY_INTEGRAL_Y = 10,    /* 2^-20 rad s: integral of e, y */
+    IFVSC_TELEMETRY_INTEGRAL_Z = 11,    /* 2^-20 rad s: integral of e, z */
+    IFVSC_TELEMETRY_WORDS = 12
+};
+
 /* TELEMETRY words of state_space, from the law's first. */
 enum {
     STATE_SPACE_TELEMETRY_ERROR_X = 0,    /* 2^-29 rad: ym(k) - y(k), x */
@@ -276,12 +504,20 @@ enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };
 enum { APPC_ADAPT_OFF = 0, APPC_ADAPT_ON = 1 };
 enum { APPC_GYRO_OFF = 0, APPC_GYRO_ON = 1 };
+enum { FVSC_ERROR_EULER = 0, FVSC_ERROR_QUATERNION = 1 };
+enum { FVSC_RATE_IN_S_SENSED = 0, FVSC_RATE_IN_S_DIFFERENCE = 1 };
+enum { FVSC_INFERENCE_CLOSED = 0, FVSC_INFERENCE_TABLE = 1 };
+enum { VSC_ERROR_EULER = 0, VSC_ERROR_QUATERNION = 1 };
+enum { VSC_RATE_IN_S_SENSED = 0, VSC_RATE_IN_S_DIFFERENCE = 1 };
+enum { IFVSC_ERROR_EULER = 0, IFVSC_ERROR_QUATERNION = 1 };
+enum { IFVSC_RATE_IN_S_SENSED = 0, IFVSC_RATE_IN_S_DIFFERENCE = 1 };
+enum { IFVSC_INFERENCE_CLOSED = 0, IFVSC_INFERENCE_TABLE = 1 };
 enum { STATE_SPACE_ERROR_EULER = 0, STATE_SPACE_ERROR_QUATERNION = 1 };
 enum { STATE_SPACE_ANTI_WINDUP_OFF = 0, STATE_SPACE_ANTI_WINDUP_ON = 1 };
 
 enum {
     ROW_WORDS = 4, /* of one guidance row: tick, x, y, z */
-    LAW_TABLES_COUNT = 4,
+    LAW_TABLES_COUNT = 7,
     NO_WORD = 255
 };
 

@@ -13,7 +13,7 @@ from episodes import Episode
 
 from firmware_sim.fields import Field, offsets
 from protocol.law_tables import law_by_name
-from tools.c_states import STRUCTS, c_dtype
+from tools.c_states import SHARED, STRUCTS, c_dtype
 
 HEAD = np.dtype(
     [
@@ -77,7 +77,7 @@ def law_dtype(law: str) -> np.dtype:
     """One step as C records it."""
     parts = [("head", HEAD)]
     for name in ("reference", law):
-        _, par, state = STRUCTS[name]
+        _, par, state = STRUCTS[SHARED.get(name, name)]
         parts.append((name, np.dtype([("par", c_dtype(par)), ("state", c_dtype(state))])))
     return np.dtype(parts)
 
@@ -100,7 +100,7 @@ def _wrong(episode: Episode, trace: bytes) -> dict[str, np.ndarray]:
         "telemetry": (np.column_stack([head["telemetry"], head["telemetry_words"]]) != telemetry).any(1),
     }
     for name, par, state in (("reference", e.ref_par, e.ref), (law, e.par, e.state)):
-        _, par_fields, state_fields = STRUCTS[name]
+        _, par_fields, state_fields = STRUCTS[SHARED.get(name, name)]
         rows = np.broadcast_to(par, (steps, len(par)))
         wrong |= _fields_wrong(f"{name}.par", par_fields, got[name]["par"], rows)
         wrong |= _fields_wrong(f"{name}.state", state_fields, got[name]["state"], state)

@@ -170,6 +170,29 @@ def _appc(rng: np.random.Generator) -> dict[str, Any]:
     return {**_common(rng, float(rng.uniform(0.2, 1.0))), **values}
 
 
+def _vsc(rng: np.random.Generator) -> dict[str, Any]:
+    """The tuned law of study 000, its time scaled to the period."""
+    period = float(np.exp(rng.uniform(math.log(0.05), math.log(5.0))))
+    slow = period * rng.uniform(10, 60)
+    gains = {"Ks": 1.449 / slow**2, "Kr": 0.914 / slow, "m": 0.881 / slow, "ka": _inertia(rng)}
+    if rng.random() < 0.1:
+        gains = {"Ks": rng.uniform(0, 2000), "Kr": rng.uniform(0, 2000), "m": rng.uniform(0, 100), "ka": _inertia(rng)}
+    return {**_common(rng, period), **gains, **_readings(rng), "rate_in_S": int(rng.random() < 0.4)}
+
+
+def _fvsc(rng: np.random.Generator) -> dict[str, Any]:
+    values = _vsc(rng)
+    table = np.clip(np.cumsum(rng.uniform(-0.01, 0.03, 65)), -1, 1)
+    fuzzy = {"E": float(np.exp(rng.uniform(-5, 1))), "L": float(rng.uniform(0.1, 1)), "inference": int(rng.integers(2))}
+    return {**values, **fuzzy, "f_table": table.tolist()}
+
+
+def _ifvsc(rng: np.random.Generator) -> dict[str, Any]:
+    values = _fvsc(rng)
+    limit = float(np.exp(rng.uniform(-5, 5)))
+    return {**values, "Ki": float(rng.choice([0.01, 0.1]) * values["Ks"]), "integral_limit": limit}
+
+
 def _state_space(rng: np.random.Generator) -> dict[str, Any]:
     """PD with a filtered derivative, and states beside it that do little; one in ten has numbers without any sense."""
     period, n = float(np.exp(rng.uniform(math.log(0.05), math.log(5.0)))), int(rng.integers(1, 9))
@@ -191,7 +214,8 @@ def _state_space(rng: np.random.Generator) -> dict[str, Any]:
     return values | {"D": float(wn * wn + kd), "gain": (np.array([2.13, 3.04, 3.09]) * rng.uniform(0.8, 1.2)).tolist()}
 
 
-CONFIGURATIONS = {"pd": _pd, "mrac": _mrac, "appc": _appc, "state_space": _state_space}
+CONFIGURATIONS = {"pd": _pd, "mrac": _mrac, "appc": _appc, "fvsc": _fvsc, "vsc": _vsc, "ifvsc": _ifvsc,
+                  "state_space": _state_space}  # fmt: skip
 
 
 def _flight(configuration: Configuration, rng: np.random.Generator, wild: bool) -> Episode:
@@ -242,6 +266,8 @@ class Satellite:
         common, values = configuration.common, configuration.values
         self._period = common["period_us"] * 1e-6
         belief = configuration.vector("inertia_kgm2") if "inertia_kgm2_x" in values else (2.13, 3.04, 3.09)
+        if "ka_x" in values:
+            belief = configuration.vector("ka")
         if configuration.table.name == "pd":  # what its gains are for: damping 1
             belief = tuple(
                 min(max(kd * kd / 4 / max(abs(kp), 1e-9), 0.1), 50.0)

@@ -13,7 +13,7 @@ from firmware_sim.fields import Field, offsets, size
 from firmware_sim.guidance import reference
 from protocol.law_tables import config_words, law_by_name, parse_configuration
 from protocol.laws import IN_C
-from tools.c_states import STRUCTS, c_dtype, c_order, c_size
+from tools.c_states import SHARED, STRUCTS, c_dtype, c_order, c_size
 
 TABLES = [(name, table) for name, (_, par, state) in STRUCTS.items() for table in (par, state)]
 EIGHT = [1000.0] * 8
@@ -38,6 +38,13 @@ CORNERS = {
         {"period_us": 1_000_000, "inertia_kgm2": 0.0500001, "controller_pole": 0.99, "orbit_rate_radps": 0.007},
     ],
 }
+CORNERS["vsc"] = [
+    {"period_us": 1000, "ka": 1e6, "Ks": 2000, "Kr": 2000, "m": 100, "torque_bits": 30, "torque_limit": 1},
+    {"period_us": 10_000_000, "ka": 1e-9, "torque_bits": 8, "rate_bits": 30, "rate_in_S": 1, "error": 0},
+]
+FUZZY = [{"E": 2.0**-9}, {"E": 3.2, "inference": 1}]
+CORNERS["fvsc"] = [corner | fuzzy for corner in CORNERS["vsc"] for fuzzy in FUZZY]
+CORNERS["ifvsc"] = [corner | {"Ki": 2000, "integral_limit": 2000} for corner in CORNERS["fvsc"]]
 REFERENCES = [{"reference_pole": pole, "reference_kind": kind} for pole in (0, 1) for kind in (0, 1, 2)]
 
 
@@ -49,10 +56,11 @@ def fits(numbers: np.ndarray, fields: Sequence[Field]) -> None:
 
 
 def test_every_law_has_a_struct_under_its_name() -> None:
-    assert set(STRUCTS) == {*IN_C, "reference"}
+    assert set(STRUCTS) == {*IN_C, "reference"} - set(SHARED)
     for name in IN_C:
-        law = importlib.import_module(f"firmware_sim.controllers.{name}")
-        assert STRUCTS[name][1:] == (law.PAR, law.STATE)
+        module, _, cls = LAWS[name].partition(":")
+        law = getattr(importlib.import_module(module), cls)
+        assert STRUCTS[SHARED.get(name, name)][1:] == (law.PAR, law.STATE)
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -157,7 +157,7 @@ def test_the_verb_judges_by_limits_and_baseline(tmp_path: Path, capsys: pytest.C
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["mrak"], "LAWS: expected one of pd, appc, mrac, state_space (did you mean mrac?), got 'mrak'"),
+        (["mrak"], "LAWS: expected one of pd, appc, mrac, fvsc, state_space (did you mean mrac?), got 'mrak'"),
         (["pd", "--against", "nowhere.json"], "nowhere.json: cannot read: No such file or directory"),
         (["pd", "--image", "nowhere.elf"], "cortex-m: nowhere.elf: no such image: build it with `make firmware`"),
     ],
