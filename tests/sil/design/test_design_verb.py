@@ -11,6 +11,7 @@ import yaml
 
 from sil.cli import invoke
 from sil.configure import orders
+from sil.design.fuzzy import half_table, one_input
 from sil.design.linear import StateSpace
 from sil.scenario import load_scenario
 
@@ -82,6 +83,16 @@ def test_what_the_board_is_told_answers_as_what_was_designed(
     np.testing.assert_allclose(told.response(omega), meant.response(omega), rtol=1e-4)
     assert [values[f"gain_{axis}"] for axis in "xyz"] == pytest.approx([2, 3, 4], rel=1e-8)
     assert values["state_bits"] == 28
+
+
+def test_a_fuzzy_table_arrives_at_the_law(tmp_path: Path) -> None:
+    """Its 65 words hold -f(e)/L of MATLAB's sets, in Q15."""
+    file = tmp_path / "law.yaml"
+    assert invoke(["design", "fuzzy", "--error", "0.4", "--inputs", "matlab", "--out", str(file)]) == 0
+    values = orders(load_scenario(str(file), ["sensors.rate.enabled=true"])).configuration.values
+    table = [values[f"f_table_{i}"] for i in range(1, 66)]
+    np.testing.assert_allclose(table, half_table(one_input(0.4, 1.0, "matlab")), atol=2**-16)
+    assert values["inference"] == 1 and values["E"] == pytest.approx(0.4)
 
 
 def test_an_unstable_loop_is_said_so_and_a_drifting_one_warned_of(capsys: pytest.CaptureFixture[str]) -> None:
