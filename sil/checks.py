@@ -18,6 +18,7 @@ from protocol.laws import IN_C
 from sil import scenario_law as laws
 from sil.boards import FIRMWARE, WITHOUT_TIMER
 from sil.configure import orders
+from sil.instruments import ages_s
 from sil.scenario import Scenario, load_scenario
 from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
 from sil.scenario_events import RESTART
@@ -65,6 +66,7 @@ def check(scenario: Scenario) -> list[Finding]:
             firmware_flies,
             _law,
             _sensors,
+            _old_readings,
             _clock,
             _deadline,
             _lateness_limit,
@@ -136,6 +138,19 @@ def _sensors(scenario: Scenario) -> Iterator[Finding]:
     for bit, name in enumerate(SENSORS):
         if needs >> bit & 1 and not getattr(scenario.sensors, name).enabled:
             yield _error(scenario, f"sensors.{name}.enabled", f"true, law {scenario.law.name} reads it", "false")
+
+
+def _old_readings(scenario: Scenario) -> Iterator[Finding]:
+    """A law that knows one delay only takes its readings for those of t_k."""
+    knows, sampled = scenario.law_variant.transport_delays, not scenario.sensors.times_of("attitude").instantaneous
+    if not (sampled and scenario.sensors.attitude.enabled) or max(knows) > 1:
+        return
+    mean_s, half_s = ages_s(scenario, "attitude")[0], 0.5 * scenario.period_s
+    if mean_s >= half_s:
+        own = scenario.sensors.attitude.sampling.delay_s is not None
+        key = f"sensors.{'attitude.' if own else ''}sampling.delay_s"
+        expected = f"readings less than half a period old ({half_s:g} s), law {scenario.law.name} takes them for fresh"
+        yield _warning(scenario, key, expected, f"{mean_s:.3g} s on average")
 
 
 def _clock(scenario: Scenario) -> Iterator[Finding]:

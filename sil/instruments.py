@@ -6,7 +6,7 @@ truth -> sensor -> sampling: period, hold, delay, jitter -> faults -> SAMPLE    
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from sil.actuators import ACTUATORS
@@ -20,6 +20,8 @@ from sil.sensors import SENSORS
 from sil.sensors import faults as sensor_faults
 from sil.sensors.sampled import Instants, Sampled, instants
 from sil.signals import Actuator, Sensor
+
+LOOKED_AT = 2000  # ticks, for a mean
 
 
 class Instruments(NamedTuple):
@@ -45,6 +47,22 @@ def instants_of(scenario: Scenario, name: str) -> Instants:
     """When the sensor `name` looks."""
     consumer = f"sensors.{name}.sampling"
     return instants(scenario.sensors.times_of(name), scenario.period_us, scenario.seed, consumer)
+
+
+def ages_s(scenario: Scenario, name: str) -> tuple[float, float]:
+    """How old the readings of the sensor `name` are at t_k, once they come: mean and most, s."""
+    times, when = scenario.sensors.times_of(name), instants_of(scenario, name)
+    first = (3 * times.delay_us + times.period_us) // scenario.period_us + 1
+    ages = [tick * scenario.period_us - when.at_us(when.read_at(tick)) for tick in range(first, first + LOOKED_AT)]
+    return sum(ages) / len(ages) * 1e-6, max(ages) * 1e-6
+
+
+def ages(scenario: Scenario) -> Iterator[str]:
+    """A line for each sensor whose readings are not those of t_k."""
+    for name in (name for name in SENSORS if getattr(scenario.sensors, name).enabled):
+        if not scenario.sensors.times_of(name).instantaneous:
+            mean_s, most_s = ages_s(scenario, name)
+            yield f"sensors.{name}: readings are {mean_s * 1e3:.4g} ms old on average, at most {most_s * 1e3:.4g} ms"
 
 
 def actuator_of(scenario: Scenario) -> Actuator:

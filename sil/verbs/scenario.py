@@ -29,6 +29,7 @@ def check(
     Examples: sil check mine.yaml | sil check mrac-rs232 --set link.baud=9600 | sil check mine.yaml --json
     """
     from sil.checks import check as findings_of
+    from sil.instruments import ages
     from sil.scenarios import SCHEMA
 
     loaded = scenario_from(scenario, set_, variant=variant)
@@ -46,6 +47,8 @@ def check(
         print(f"{loaded.name}: valid, {loaded.ticks} ticks of {loaded.period_s:g} s")
         if others:
             print(f"its variants, valid: {', '.join(loaded.variants)}")
+        for line in ages(loaded):
+            print(line)
         print(f"schema for editors, first line of the file: # yaml-language-server: $schema={SCHEMA}")
     return EXIT_OK
 

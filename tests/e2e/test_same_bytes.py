@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 
+import numpy as np
 import pytest
 
 from protocol import frames
@@ -53,6 +54,37 @@ def test_a_paced_run_without_a_real_miss_gives_the_lockstep_bytes(tmp_path, cloc
             return
     record_property("inconclusive", f"real misses in three runs on {clock}: not shown")
     pytest.skip(f"not shown: real misses in three runs on {clock} (this machine is too busy)")
+
+
+SAMPLED = [
+    "duration_s=30",
+    "period_s=0.1",
+    "law.name=pd",
+    "sensors.sampling={period_s: 0.13, delay_s: 0.05, jitter_s: 0.02}",
+    "sensors.rate={enabled: true, noise_degps: 0.01, sampling: {delay: unit}}",
+    "actuators={kind: thrusters, thrusters: {misalignment_percent: 5, faults: [{kind: 'off', at_s: 20, axis: y}]}}",
+    "plant.step_s=0.001",
+]
+
+
+def test_sensors_at_their_own_pace_and_thrusters_give_the_same_bytes_everywhere(tmp_path, record_property):
+    """Instants between ticks, jitter and noise are of seed and sample; a restart of the board moves none of them."""
+    wheres = {"pty": ["link.url=pty"], "udp": ["link.url=udp"], "inproc": ["board=inproc"]}
+    wheres["clock"] = ["clock=scaled:15"]
+    found = {where: fly(tmp_path / where, "pd-root-locus", *SAMPLED, *sets) for where, sets in wheres.items()}
+    if not found["clock"].pop("reproducible"):
+        record_property("inconclusive", "real misses on scaled:15: not shown")
+        del found["clock"]
+    assert len({summary["sha256"] for summary in found.values()}) == 1
+    run = open_run(tmp_path / "pty")
+    assert len(np.unique(run.samples["age_us"][:, 0])) > 100, "instants between the ticks"
+    assert not run.momentum_Nms.any()
+    assert replay(run).identical
+    restarted = fly(tmp_path / "restart", "pd-root-locus", *SAMPLED, "events=[{at_s: 5, do: board.restart, for_s: 1}]")
+    assert restarted["sha256"] != found["pty"]["sha256"]
+    samples = open_run(tmp_path / "restart").samples
+    assert len(samples) == len(run.samples) - 10
+    assert (samples["age_us"] == run.samples["age_us"][np.isin(run.samples["tick"], samples["tick"])]).all()
 
 
 # -- replay ----------------------------------------------------------------------------------------------------------

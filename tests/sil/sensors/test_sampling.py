@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from protocol.frames import Reading
-from sil.instruments import sensors_of
+from sil.checks import check
+from sil.instruments import ages, ages_s, sensors_of
 from sil.loop import Loop, Scales, Timing
 from sil.noise import Gaussian
 from sil.plants.rigid import Rigid
@@ -154,6 +155,35 @@ def test_faults_are_around_the_unit():
     values = [made.sensors[0].read(motion._replace(t_ns=k * 100_000_000), k) for k in range(3)]
     assert [value.values[0] for value in values] == [2**29, 2**29, 2**30]
     assert [value.age_us for value in values] == [0, 100_000, 200_000]
+
+
+@pytest.mark.parametrize(
+    ("sampling", "mean_s", "most_s"),
+    [
+        ({"period_s": 0.1, "delay_s": 0.4}, 0.4, 0.4),
+        ({"period_s": 0.1, "delay_s": 0.4, "delay": "unit"}, 0.55, 0.7),  # 4, 5, 6, 7 ticks of 0.1 s
+        ({"period_s": 0.3}, 0.1, 0.2),
+        ({"delay_s": 0.123}, 0.123, 0.123),
+    ],
+)
+def test_how_old_readings_are(sampling, mean_s, most_s):
+    values = {"period_s": 0.1, "sensors": {"sampling": sampling}, "law": {"name": "appc"}}
+    scenario = load_values(values)
+    assert ages_s(scenario, "attitude") == pytest.approx((mean_s, most_s), abs=2e-4)
+    assert [line.split(":")[0] for line in ages(scenario)] == ["sensors.attitude"]
+
+
+def test_a_law_that_takes_readings_for_fresh_is_warned_of_old_ones():
+    def said(name, **sampling):
+        found = check(load_values({"sensors": {"sampling": sampling}, "law": {"name": name}}))
+        return [str(finding) for finding in found if "sampling" in finding.key]
+
+    (line,) = said("appc", delay_s=0.4)
+    assert line.endswith(
+        "sensors.sampling.delay_s: expected readings less than half a period old (0.25 s), law appc takes them for "
+        "fresh, got 0.4 s on average"
+    )
+    assert said("appc", delay_s=0.2) == said("pd", delay_s=0.4) == said("appc") == []
 
 
 # -- in the loop ------------------------------------------------------------------------------------------------------
