@@ -75,7 +75,7 @@ def sil(
 
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
-    "Look": (report.info, report.plot, compare.compare, report.export, report.diff),
+    "Look": (report.info, report.report, report.plot, compare.compare, report.export, report.diff),
     "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, faults.faults, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }

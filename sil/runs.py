@@ -27,6 +27,7 @@ from sil.sinks.journal import Fate
 
 Array = npt.NDArray[Any]
 _OPENED = ("/truth", "/command", "/telemetry", "/event", "/session")
+_PACKETS = ("/packet/up", "/packet/down")
 _REFERENCE_RESTART = 7
 _RAD = np.pi / 180.0
 _UNREADABLE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
@@ -96,12 +97,13 @@ class Run:
         if self.period_ns <= 0:
             raise ValueError(f"period_ns: expected a number above 0, got {self.period_ns}")
         self.period_s = self.period_ns * 1e-9
-        self.truth = _rows(content, "/truth", layouts.TRUTH)
-        self.commands = _rows(content, "/command", layouts.COMMAND)
-        self.sessions = [int(row["tick"]) for row in _rows(content, "/session", layouts.SESSION)]
-        self._events = _rows(content, "/event", layouts.EVENT)
+        self.truth = _rows(content.messages, "/truth", layouts.TRUTH)
+        self.commands = _rows(content.messages, "/command", layouts.COMMAND)
+        self.sessions = [int(row["tick"]) for row in _rows(content.messages, "/session", layouts.SESSION)]
+        self._events = _rows(content.messages, "/event", layouts.EVENT)
         self._columns = self._from_truth() | self._from_commands()
         self.telemetry, telemetry_units = self._from_telemetry(content)
+        self._ahead = {topic: rows for topic, rows in content.messages.items() if topic not in _OPENED}
         self.units: dict[str, str] = COLUMNS | TRIPLES | telemetry_units
 
     # -- by name -------------------------------------------------------------------------------------------------
@@ -206,11 +208,11 @@ class Run:
     @cached_property
     def packets(self) -> list[PacketRow]:
         """All deterministic frames in the order of the log (read when first asked for)."""
-        content = _read(self.path, ("/packet/up", "/packet/down"))
+        messages = self._messages(_PACKETS)
         rows = []
         with readable(self.path):
             for direction in ("up", "down"):
-                for message in content.messages[f"/packet/{direction}"]:
+                for message in messages[f"/packet/{direction}"]:
                     _, sequence, type_, fate, packet, encoded, cause, copy, at_ns = layouts.PACKET.unpack(message[1])
                     tick, named = message[0] // self.period_ns, Fate(fate).name.lower()
                     rows.append(PacketRow(tick, direction, type_, sequence, named, packet, encoded, cause, copy, at_ns))
@@ -220,7 +222,7 @@ class Run:
     def samples(self) -> Array:
         """All SAMPLE rows as a structured array (sil.sinks.layouts.SAMPLE; read when first asked for)."""
         with readable(self.path):
-            return _rows(_read(self.path, ("/sample",)), "/sample", layouts.SAMPLE)
+            return _rows(self._messages(("/sample",)), "/sample", layouts.SAMPLE)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -230,6 +232,10 @@ class Run:
         except (OSError, ValueError):
             return {}
         return content if isinstance(content, dict) else {}
+
+    def _messages(self, topics: tuple[str, ...]) -> Mapping[str, list[mcap_file.Message]]:
+        """What was read ahead when the run was opened, if it has these topics; else the file once more."""
+        return self._ahead if all(topic in self._ahead for topic in topics) else _read(self.path, topics).messages
 
     # -- columns -------------------------------------------------------------------------------------------------
 
@@ -262,7 +268,7 @@ class Run:
         except (KeyError, ValueError) as error:
             raise RunError(f"{self.path}: /telemetry does not say what its words are ({error})") from error
         layout = layouts.telemetry(channel.metadata.get("law", ""), [(name, units[name]) for name in names])
-        rows = _rows(content, "/telemetry", layout)
+        rows = _rows(content.messages, "/telemetry", layout)
         columns = zip(names, layout.fields, strict=False)
         return {name: self._aligned(rows["tick"], rows[field.name]) for name, field in columns}, units
 
@@ -329,15 +335,17 @@ class Run:
         return wrapped_deg(self["attitude_deg"] - self["setpoint_deg"])
 
 
-def open_run(path: str | os.PathLike[str]) -> Run:
+def open_run(path: str | os.PathLike[str], also: tuple[str, ...] = ()) -> Run:
     """Read a run: a run directory or an .mcap file; names and units: `help(sil.open_run)`. Every CRC is checked.
 
-    Raises RunError, one line: no such run, not sealed yet, empty, cut off, corrupt, not MCAP, somebody else's MCAP.
+    also: topics that will be asked for (`/sample` for samples, `/packet/up` and `/packet/down` for packets): a long log
+    is then read once. Raises RunError, one line: no such run, not sealed yet, empty, cut off, corrupt, not MCAP,
+    somebody else's MCAP.
     """
     file = Path(path)
     if file.is_dir():
         file = _log_of(file)
-    content = _read(file, _OPENED)
+    content = _read(file, (*_OPENED, *also))
     if "run" not in content.metadata or "/truth" not in content.channels:
         raise RunError(f"{file}: an MCAP log (of {content.library or 'unknown origin'}), but not one of a run")
     with readable(file):
@@ -364,7 +372,13 @@ def _read(path: Path, topics: tuple[str, ...]) -> mcap_file.Content:
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
     except mcap_file.McapError as error:
-        raise RunError(f"{path}: {error}") from error
+        raise RunError(f"{path}: {error}{_remedy(path)}") from error
+
+
+def _remedy(path: Path) -> str:
+    """What to do about a damaged log: its journal may be there still."""
+    has_journal = path.name == "run.mcap" and (path.parent / "run.journal").exists()
+    return f"; `sil recover {path.parent}` makes it anew from run.journal" if has_journal else ""
 
 
 def _check_sections(scenario: Any) -> None:
@@ -375,9 +389,9 @@ def _check_sections(scenario: Any) -> None:
             raise ValueError(f"scenario.json: {key}: expected {_SECTIONS.get(key, dict).__name__}, got {value!r}")
 
 
-def _rows(content: mcap_file.Content, topic: str, layout: layouts.Layout) -> Array:
+def _rows(messages: Mapping[str, list[mcap_file.Message]], topic: str, layout: layouts.Layout) -> Array:
     start = len(layouts.CDR_HEADER)
-    data = b"".join([message[1][start:] for message in content.messages.get(topic, ())])
+    data = b"".join([message[1][start:] for message in messages.get(topic, ())])
     return np.frombuffer(data, layout.dtype)
 
 

@@ -17,8 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from sil.metrics import as_json, measure
+from sil.report.colours import AXIS_NAMES
 from sil.report.facts import labels, law_of
-from sil.report.look import AXIS_NAMES
 from sil.report.signals import controlled
 from sil.runs import Run
 

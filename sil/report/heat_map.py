@@ -18,7 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter
 
-from sil.report.look import LIGHT, Look, empty, headed
+from sil.report.colours import LIGHT, Look
+from sil.report.look import empty, headed
 
 LEFT_in, RIGHT_in, TOP_in, BOTTOM_in, GAP_X_in, GAP_Y_in = 1.15, 1.35, 1.6, 1.15, 0.25, 0.78
 ROW_in = 1.75

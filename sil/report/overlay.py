@@ -18,8 +18,9 @@ from matplotlib.lines import Line2D
 
 from sil.metrics import DIVERGED_deg, diverged_at_s
 from sil.report import look as looks
+from sil.report.colours import AXIS_NAMES, Look, scaled
 from sil.report.facts import facts, labels
-from sil.report.look import AXIS_NAMES, DASHED, DOTTED, Look, WIDTH_in, finish, line, scaled, unbroken
+from sil.report.look import DASHED, DOTTED, WIDTH_in, finish, line, unbroken
 from sil.report.signals import Signal, SignalError, controlled, has, logarithmic
 from sil.runs import Array, Run, wrapped_deg
 

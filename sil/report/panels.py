@@ -15,9 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sil.report import look as looks
+from sil.report.colours import AXIS_NAMES, Look, scaled
 from sil.report.facts import facts
-from sil.report.look import AXIS_NAMES, DASHED, DOTTED, Look, finish, legend, line, scaled, unbroken
-from sil.report.signals import Signal, controlled, error_deg, logarithmic, signals_of
+from sil.report.look import DASHED, DOTTED, finish, legend, line, unbroken
+from sil.report.signals import Signal, controlled, error_deg, logarithmic, near_limits, signals_of
 from sil.runs import Array, Run
 
 PANEL_in = 2.5
@@ -213,17 +214,6 @@ def _limits(ax: Axes, limits: Array, factor: float, look: Look) -> None:
     for value in limits:
         for sign in (-1, 1):
             ax.axhline(sign * value * factor, color=look.ink, lw=0.9, ls="-.")
-
-
-def near_limits(run: Run, axes: Sequence[int], key: str = "torque_max_Nm", name: str = "applied_Nm") -> Array:
-    """Limits `key` of the actuators on these axes, where the values `name` come near them."""
-    actuators = run.scenario.get("actuators") or {}
-    limits = (actuators.get(actuators.get("kind", "wheels")) or {}).get(key)
-    values = run[name]
-    if limits is None or not np.isfinite(values).any():
-        return np.empty(0)
-    chosen = np.unique(np.broadcast_to(np.asarray(limits, float), 3)[list(axes)])
-    return np.asarray(chosen[chosen < 2.0 * np.nanmax(np.abs(values))])
 
 
 def _focus(ax: Axes, applied: Array) -> None:

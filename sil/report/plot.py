@@ -14,7 +14,8 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 
 from sil.report import overlay, panels
-from sil.report.look import DARK, DPI, LIGHT, Look
+from sil.report.colours import DARK, LIGHT, Look
+from sil.report.look import DPI
 from sil.report.signals import GROUP, Signal, chosen, controlled, identified, signals_of
 from sil.report.whole_file import beside
 from sil.runs import Run

@@ -118,6 +118,17 @@ def logarithmic(name: str, values: Array) -> bool:
     return name in ("trace", "P") and bool(finite.size) and finite.min() > 0 and finite.max() > 30 * finite.min()
 
 
+def near_limits(run: Run, axes: Sequence[int], key: str = "torque_max_Nm", name: str = "applied_Nm") -> Array:
+    """Limits `key` of the actuators on these axes, where the values `name` come near them."""
+    actuators = run.scenario.get("actuators") or {}
+    limits = (actuators.get(actuators.get("kind", "wheels")) or {}).get(key)
+    values = run[name]
+    if limits is None or not np.isfinite(values).any():
+        return np.empty(0)
+    chosen = np.unique(np.broadcast_to(np.asarray(limits, float), 3)[list(axes)])
+    return np.asarray(chosen[chosen < 2.0 * np.nanmax(np.abs(values))])
+
+
 # -- TELEMETRY ---------------------------------------------------------------------------------------------------------
 
 

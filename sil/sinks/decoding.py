@@ -107,9 +107,7 @@ class Decoder:
 
     def _scale(self, word: Word) -> float:
         """Value of one count, in the unit of _name_unit."""
-        turn = {"2^-32 turn": DEG_PER_BAM, "turn": 360.0}
-        factor = next((value for prefix, value in turn.items() if word.unit.startswith(prefix)), 1.0)
-        return factor * law_tables.lsb_of(word, self._named())
+        return turns_of(word) * law_tables.lsb_of(word, self._named())
 
     def _named(self) -> dict[str, int]:
         return {word.name: self.words.get(i, int(word.default)) for i, word in _plain()}
@@ -118,6 +116,12 @@ class Decoder:
         words = self.words
         bits = [words.get(_BITS_AT[name], int(COMMON[_BITS_AT[name]].default)) for name in _BITS]
         self._torque, self._momentum, self._rate = (2.0**-n for n in bits)
+
+
+def turns_of(word: Word) -> float:
+    """deg in the unit of a word that counts turns; 1 for other units."""
+    turn = {"2^-32 turn": DEG_PER_BAM, "turn": 360.0}
+    return next((value for prefix, value in turn.items() if word.unit.startswith(prefix)), 1.0)
 
 
 def _plain() -> list[tuple[int, Word]]:

@@ -1,4 +1,4 @@
-"""sil info, plot, export, diff: what a run was, and how two differ."""
+"""sil info, report, plot, export, diff: what a run was, and how two differ."""
 
 from __future__ import annotations
 
@@ -14,6 +14,16 @@ from sil.verbs.options import RESULT_PANEL, JsonOption, RunArgument, opened, pri
 
 DRAWN_PANEL = "What is drawn"
 COMPARED_PANEL = "How they are compared"
+
+
+RunsArgument = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="RUN...",
+        help="Run directories or .mcap files; several are overlaid.",
+        autocompletion=completion.runs,
+    ),
+]
 
 
 def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
@@ -36,15 +46,51 @@ def info(run_dir: RunArgument, as_json: JsonOption = False) -> int:
     return EXIT_OK
 
 
-def plot(
-    run_dirs: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="RUN...",
-            help="Run directories or .mcap files; several are overlaid.",
-            autocompletion=completion.runs,
+def report(
+    run_dirs: RunsArgument,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="HTML file. Default: RUN/report.html; of several runs report-A-B.html here.",
+            rich_help_panel=RESULT_PANEL,
         ),
-    ],
+    ] = None,
+    open_: Annotated[
+        bool, typer.Option("--open", help="Show it in the browser.", rich_help_panel=RESULT_PANEL)
+    ] = False,
+) -> int:
+    """Everything about a run on one page: verdict, plots, the satellite in 3-D, link, deadlines, arithmetic, events.
+
+    One HTML file that needs no network and no further file, so it can be mailed, archived and printed; light and dark,
+    on a screen and on a phone. A slider moves the satellite and the cursor of all plots. Several runs are drawn over
+    each other, each axis in a plot of its own, with a table of what their scenarios differ in. Long runs are drawn in
+    bins that keep their smallest and largest values.
+
+    Exit codes: 0 written, 2 usage, or not a run.
+
+    Examples: sil report runs/mrac-rs232-001 | sil report runs/mrac-rs232-001 runs/appc-rs232-001 --out both.html
+    """
+    from sil.report.page import ALSO, default_out
+    from sil.report.page import report as write
+    from sil.runs import open_run
+    from sil.verbs.stages import Stages
+
+    with Stages("report") as stages:
+        runs = []
+        for path in run_dirs:
+            stages.begin(f"reading {path}")
+            runs.append(open_run(path, ALSO))
+        target = write(runs, out or default_out(runs), stages.begin)
+    print(target)
+    if open_:
+        typer.launch(target.resolve().as_uri())
+    return EXIT_OK
+
+
+def plot(
+    run_dirs: RunsArgument,
     signals: Annotated[
         list[str] | None,
         typer.Option(

@@ -83,6 +83,10 @@ def test_the_wheel_holds_the_three_packages_the_firmware_and_their_data(site):
         ["git", "ls-files", "firmware"], cwd=REPO, capture_output=True, text=True, check=True
     ).stdout
     assert {name for name in names if name.startswith("firmware/")} == set(listed.split()), "all of it, and no build/"
+    assets = subprocess.run(
+        ["git", "ls-files", "sil/report/page/assets"], cwd=REPO, capture_output=True, text=True, check=True
+    ).stdout
+    assert set(assets.split()) <= names, "the report's page is made of them"
     assert {"protocol/SPEC.md", "sil/scenarios/mrac-rs232.yaml", "sil/py.typed"} <= names
 
 

@@ -15,8 +15,8 @@ from PIL import Image
 from synthetic import synthetic_journal
 
 from sil import cli
+from sil.report.colours import DARK, LIGHT
 from sil.report.facts import facts, labels
-from sil.report.look import DARK, LIGHT
 from sil.report.overlay import Ensemble, common
 from sil.report.plot import PlotError, default_out, pages, plot
 from sil.report.signals import SignalError, chosen, signals_of
