@@ -13,7 +13,8 @@ from scipy.linalg import expm
 from sil.design.linear import Array, Complex, StateSpace, series
 from sil.design.margins import continuous, held
 from sil.design.sheet import Sheet, loop_of, stepped
-from sil.report.look import DASHED, LIGHT, Look, empty, finish, headed
+from sil.report.colours import LIGHT, Look
+from sil.report.look import DASHED, empty, finish, headed
 
 HEIGHT_in = 9.2
 LEFT, RIGHT = 0.075, 0.985

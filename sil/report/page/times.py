@@ -11,6 +11,7 @@ from protocol import frames
 from protocol.frames import Type
 from sil import mcap_file
 from sil.lateness import Cause, histogram, percentiles_us
+from sil.plain import flat
 from sil.report.signals import NO_ANSWER
 from sil.runs import Array, Run
 from sil.sinks import layouts
@@ -37,7 +38,7 @@ def times(run: Run) -> dict[str, Any]:
         "answer": _distribution(rows["answer_ns"][rows["answer_ns"] != NO_ANSWER]),
         "causes": _causes(rows),
         "board": board,
-        "host": [[key, str(value)] for key, value in host.items() if value not in ("", None, 0)],
+        "host": [[key, str(value)] for key, value in flat(host).items() if value not in ("", None, 0)],
     }
 
 
