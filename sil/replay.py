@@ -103,7 +103,8 @@ def recorded_scenario(run: Run, sets: Iterable[str] = (), board: str = "process"
     law_file = run.summary.get("law_file") or ""
     directory = Path(law_file).parent if law_file else Path()
     link = {**run.scenario.get("link", {}), "url": "udp"}  # the one that every fault fits; no link is opened by it
-    values = {**run.scenario, "clock": "lockstep", "link": link, "board": board}
+    plant = {**run.scenario.get("plant", {}), "kind": "rigid"}  # nobody flies it
+    values = {**run.scenario, "plant": plant, "clock": "lockstep", "link": link, "board": board}
     return load_values(values, tuple(sets), where=str(run.path), directory=directory)
 
 

@@ -23,8 +23,6 @@ from sil.commands import CommandWindow, Decides, ExecutionModel
 from sil.configure import Orders, orders, row_at
 from sil.instruments import actuator_of, sensors_of
 from sil.loop import Loop, Scales, Timing
-from sil.plants import PLANTS
-from sil.plugins import load
 from sil.realtime import may_lock_memory
 from sil.rejoin import Rejoin
 from sil.scenario import Scenario
@@ -36,6 +34,7 @@ from sil.sinks.journal import Direction
 from sil.sinks.journal import Fate as Outcome
 from sil.trouble import LinkFailure, UsageError
 from sil.unplugged import Nobody, Scheduled
+from sil.user_plant import plant_of
 
 Notify = Callable[[str], None]
 TYPE_AT = 1  # of a packet
@@ -243,7 +242,7 @@ def _loop(
     return Loop(
         Timing(scenario.period_ns, delay, scenario.ticks),
         Scales(2.0**-scenario.torque_bits, 2.0**-scenario.wire.momentum_bits),
-        load(PLANTS, "plant.kind", scenario.plant.kind).from_scenario(scenario),
+        plant_of(scenario),
         actuator_of(scenario),
         sensors,
         lambda tick: row_at(rows, tick),

@@ -36,6 +36,7 @@ from sil.trouble import (
     LinkFailure,
     UsageError,
 )
+from sil.user_plant import sha256_of
 from sil.watch import Guarded, Watch
 
 PORT_COUNTERS = ("crc_errors", "discarded_bytes", "unknown", "sequence_gaps", "duplicates", "strangers")
@@ -187,6 +188,8 @@ def identity(scenario: Scenario, rig: Rig) -> dict[str, Any]:
         "layout_hash": f"{frames.LAYOUT_HASH:08x}",
         "versions": {"attitude-sil": version("attitude-sil")} | {name: version(name) for name in NUMBERS_DEPEND_ON},
     }
+    if plant := sha256_of(scenario):
+        meta["plant_file_sha256"] = plant
     if rig.orders is not None:
         table = rig.orders.table
         meta["law"] = {"name": table.name, "id": table.law_id, "version": table.version}

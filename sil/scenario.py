@@ -45,6 +45,8 @@ from sil.scenario_validation import problems_of, unknown_keys
 from sil.scenarios import is_file
 from sil.sensors import SENSORS
 from sil.timeline import setpoint_rows
+from sil.user_plant import is_user_plant
+from sil.user_plant import refused as refused_plant
 
 # How it is run, not what is run.
 NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out", "variants")
@@ -169,8 +171,9 @@ class Scenario(Section):
         return setpoints(self.guidance, self.period_s, self.ticks, more)
 
     def file_of(self, key: str) -> FilePath | None:
-        """The file that `schedule` or `law.name` names (without :CLASS), found from the file which says so."""
-        text = {"schedule": self.schedule, "law.name": self.law.name.rpartition(":")[0] or None}[key]
+        """The file that `schedule`, `law.name` or `plant.kind` names (without :CLASS), from the file which says so."""
+        named = {"law.name": self.law.name, "plant.kind": self.plant.kind}
+        text = self.schedule if key == "schedule" else named[key].rpartition(":")[0] or None
         return None if text is None else self._source.directory_of(tuple(key.split("."))) / text
 
     def where(self, key: str) -> Where:
@@ -308,12 +311,15 @@ def _times(scenario: Scenario) -> Iterator[Problem]:
 
 
 def _names(scenario: Scenario) -> Iterator[Problem]:
-    for key, name, known in (
-        ("plant.kind", scenario.plant.kind, PLANTS),
-        ("guidance.profile", scenario.guidance.profile, PROFILES),
-    ):
-        if name not in known:
-            yield _problem(scenario, key, one_of(known, name), name)
+    kind, profile, file = scenario.plant.kind, scenario.guidance.profile, scenario.file_of("plant.kind")
+    if profile not in PROFILES:
+        yield _problem(scenario, "guidance.profile", one_of(PROFILES, profile), profile)
+    if file is None or not is_user_plant(kind):
+        expected = None if kind in PLANTS else f"{one_of(PLANTS, kind)}, or ./FILE.py:CLASS"
+    else:
+        expected = refused_plant(file, kind)
+    if expected is not None:
+        yield _problem(scenario, "plant.kind", expected, kind)
 
 
 def _steps(scenario: Scenario) -> Iterator[Problem]:

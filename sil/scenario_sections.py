@@ -249,6 +249,7 @@ class Plant(Section):
     """The satellite."""
 
     kind: str = "rigid"
+    """A plant of the product, or ./my_plant.py:MyPlant."""
     inertia_kgm2: InertiaMatrix = ((2.13, 0.0, 0.0), (0.0, 3.04, 0.0), (0.0, 0.0, 3.09))
     """3 numbers (diagonal) or 3 rows."""
     inertia_includes_wheels: bool = False

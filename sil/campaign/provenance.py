@@ -13,7 +13,7 @@ from sil.scenario import Scenario
 from sil.trouble import UsageError
 
 PACKAGES = ("attitude-sil", "numpy", "numba")
-FILE_KEYS = ("law.name", "schedule")
+FILE_KEYS = ("law.name", "plant.kind", "schedule")
 # Show, plan or compare, but do not decide a number of a run.
 _APART = ("sil/verbs/", "sil/screen", "sil/campaign/", "sil/report/", "sil/bench/", "sil/doctor/", "sil/cli.py")
 
@@ -49,7 +49,8 @@ def refuse_changed(planned: dict[str, Any], scenario: Scenario, where: str) -> N
 
 def directory_of(scenario: Scenario) -> str:
     """Where the relative file names of this scenario start; "" if it names none."""
-    for key, text in (("law.name", scenario.law.name.rpartition(":")[0]), ("schedule", scenario.schedule)):
+    named = (("law.name", scenario.law.name.rpartition(":")[0]), ("plant.kind", scenario.plant.kind.rpartition(":")[0]))
+    for key, text in (*named, ("schedule", scenario.schedule)):
         file = scenario.file_of(key)
         if file is not None and text and not Path(text).is_absolute():
             return str(file.absolute().parents[len(Path(text).parts) - 1])
