@@ -158,6 +158,8 @@ def config_words(table: LawTable, values: Mapping[str, Value], rows: Sequence[Se
     flat = expand(table, values)
     variant = variant_of(table, flat)
     flat = {**variant.defaults, "reference_lead": variant.reference_leads[0], "readings_mask": variant.needs, **flat}
+    if table.float_only:
+        flat = {"form": FORM_FLOAT, **flat}
     flat |= {"law_id": table.law_id, "law_version": table.version, "guidance_rows": len(rows)}
     words: dict[str, int] = {}
     for word in (*COMMON, *table.params):
@@ -307,12 +309,14 @@ def _rows(words: Sequence[int], start: int) -> tuple[tuple[int, int, int, int], 
 
 
 def refusal(configuration: Configuration) -> str | None:
-    """Why the law cannot fly with this configuration, in one line, or None: period, delay, lead, readings, angles."""
+    """Why the law cannot fly with this configuration, in one line, or None: period, form, delay, lead, readings ..."""
     table, common = configuration.table, configuration.common
     variant = table.variant(configuration.values)
     low, high = table.period_s
     if not low * 1e6 <= common["period_us"] <= high * 1e6:
         return f"law {table.name}: expected period_s {low:g} to {high:g}, got {common['period_us'] * 1e-6:g}"
+    if table.float_only and common["form"] != FORM_FLOAT:
+        return f"law {table.name}: expected form float, got fixed"
     if common["transport_delay_ticks"] not in variant.transport_delays:
         known = ", ".join(map(str, variant.transport_delays))
         return f"law {table.name}: expected transport_delay_ticks {known}, got {common['transport_delay_ticks']}"

@@ -112,11 +112,16 @@ def _law(scenario: Scenario) -> Iterator[Finding]:
     if len(made.words) > MAX_WORDS:
         got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
         yield _error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
-    found = [*_law_period(scenario), *_law_delay(scenario)]
+    found = [*_law_form(scenario), *_law_period(scenario), *_law_delay(scenario)]
     yield from found
     reason = refusal(made.configuration)
     if reason is not None and not found:
         yield _error(scenario, "law.name", f"a configuration that law {table.name} admits", reason)
+
+
+def _law_form(scenario: Scenario) -> Iterator[Finding]:
+    if scenario.law_table.float_only and scenario.law.form != "float":
+        yield _error(scenario, "law.form", f"float for law {scenario.law.name}", scenario.law.form)
 
 
 def _law_period(scenario: Scenario) -> Iterator[Finding]:

@@ -20,6 +20,7 @@ LAWS: dict[str, str] = {
     "vsc": "firmware_sim.controllers.fvsc:Vsc",
     "ifvsc": "firmware_sim.controllers.fvsc:Ifvsc",
     "state_space": "firmware_sim.controllers.state_space:StateSpace",
+    "predictor": "firmware_sim.controllers.predictor:Predictor",
 }
 # Files of this folder that are not laws.
 SUPPORT = ("attitude_error", "compiled", "fuzzy", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")

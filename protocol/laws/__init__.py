@@ -18,6 +18,7 @@ LAWS: dict[str, str] = {
     "vsc": "protocol.laws.fvsc:VSC",
     "ifvsc": "protocol.laws.fvsc:IFVSC",
     "state_space": "protocol.laws.state_space:STATE_SPACE",
+    "predictor": "protocol.laws.predictor:PREDICTOR",
 }
 # Those that the C firmware has; to the others a board that runs it answers READY with status 2, unknown law.
 IN_C = ("pd", "mrac", "appc", "fvsc", "vsc", "ifvsc", "state_space")

@@ -28,7 +28,10 @@ VARIANTS = {
     "appc": ({}, {"gyro": 1}, {"adapt": 0}),
     "state_space": ({}, {"error": "euler", "anti_windup": 1, "A": [[1.0]], "B": [0.1], "C": [0.05], "D": 0.1}),
 }
-EACH = [(name, form, values) for name in LAWS for form in FORMS for values in VARIANTS.get(name, ({},))]
+FLOAT_ONLY = {table.name for table in protocol.laws.tables() if table.float_only}
+FORMS_OF = [(name, form) for name in LAWS for form in FORMS if form == "float" or name not in FLOAT_ONLY]
+IN_FIXED = [name for name in LAWS if name not in FLOAT_ONLY]
+EACH = [(name, form, values) for name, form in FORMS_OF for values in VARIANTS.get(name, ({},))]
 each = pytest.mark.parametrize(("name", "form", "values"), EACH, ids=lambda value: str(value))
 
 
@@ -180,15 +183,21 @@ def test_a_law_starts_anew_with_every_instance(name: str, form: str, values: dic
 def test_tables_fit_the_frames_and_the_interface(name: str) -> None:
     table = law_by_name(name)
     assert len(TELEMETRY_COMMON) + len(table.telemetry) <= MAX_TELEMETRY_WORDS
-    law = Rig(name, "fixed", {}).law
+    law = Rig(name, "float" if name in FLOAT_ONLY else "fixed", {}).law
     assert isinstance(law, CompiledLaw) and law.has_model == table.has_model
     assert len(law.telemetry()) == len(table.telemetry)
     assert all(field.width in (32, 64) and field.length > 0 for field in law.STATE)
     assert len({field.name for field in law.STATE}) == len(law.STATE)
 
 
-@pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", sorted(FLOAT_ONLY))
+def test_a_law_without_a_fixed_form_says_so(name: str) -> None:
+    configuration = parse_configuration(config_words(law_by_name(name), {"form": "fixed"}))
+    with pytest.raises(LawRefuses, match=f"law {name}: expected form float, got fixed"):
+        new_law(name, configuration)
+
+
+@pytest.mark.parametrize(("name", "form"), FORMS_OF)
 def test_what_a_law_cannot_fly_it_refuses(name: str, form: str) -> None:
     table = law_by_name(name)
     for n in range(5):
@@ -211,7 +220,7 @@ WILD = np.array([-(2**31), 2**31 - 1, 0, 1, -1, 2**30, -(2**30), 12345, -(2**20)
 
 
 @pytest.mark.parametrize("values", [{}, {"torque_bits": 20, "torque_limit": math.inf}], ids=["limited", "unlimited"])
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", IN_FIXED)
 def test_no_input_whatever_overflows_a_register(name: str, values: dict[str, object]) -> None:
     """Checked mode under inputs no sensor would give: numbers saturate and are flagged, none wraps, and the compiled
     code gives the same bits."""
