@@ -12,6 +12,12 @@ from scipy.signal import cont2discrete, dlsim
 from firmware_sim.controllers import LawRefuses, inputs, new_law
 from firmware_sim.guidance.reference import Reference
 from protocol.law_tables import config_words, law_by_name, parse_configuration
+from sil.design.discrete import discretised
+from sil.design.glover import Shape, glover
+from sil.design.linear import StateSpace
+from sil.design.lqg import Weights
+from sil.design.lqg import lqg as lqg_design
+from sil.design.realisation import fitted
 
 FORMS = ("float", "fixed")
 LSB = 2.0**-30
@@ -83,11 +89,14 @@ def lqg(**more: Any) -> dict[str, Any]:
     return values | {"period_us": 100_000, "torque_limit": 0.01, "state_bits": 20} | more
 
 
-def closed_loop(form: str, goal_rad: float, ticks: int, J: float = 0.01, **values: Any) -> np.ndarray:
+def closed_loop(form: str, goal_rad: float, ticks: int, J: float, delay: int = 0, **values: Any) -> np.ndarray:
     """(ticks, 2): angle and torque of axis x after a step of the set-point; double integrator, torque held."""
     bench, angle, rate, rows = Bench(form, **values), 0.0, 0.0, []
+    lsb = 2.0 ** -values.get("torque_bits", 30)
+    seen = [0.0] * (delay + 1)
     for _ in range(ticks):
-        u = bench.step([angle, 0.0, 0.0], [goal_rad, 0.0, 0.0])[0][0]
+        seen = [*seen[1:], angle]
+        u = bench.step([seen[0], 0.0, 0.0], [goal_rad, 0.0, 0.0])[0][0] * (1.0 if form == "float" else lsb / LSB)
         rows.append((angle, u))
         angle, rate = angle + 0.1 * rate + 0.005 * u / J, rate + 0.1 * u / J
     return np.array(rows)
@@ -95,12 +104,41 @@ def closed_loop(form: str, goal_rad: float, ticks: int, J: float = 0.01, **value
 
 def test_fixed_and_float_fly_the_studys_lqg_alike() -> None:
     """A step of 20 deg with the torque at its limit first, then 100 s of settling: an integrator in companion form."""
-    flown = {form: closed_loop(form, math.radians(20.0), 1000, **lqg()) for form in FORMS}
+    flown = {form: closed_loop(form, math.radians(20.0), 1000, 0.01, **lqg()) for form in FORMS}
     difference = np.abs(flown["fixed"] - flown["float"]).max(axis=0)
     print(f"fixed against float: {math.degrees(difference[0]):.1e} deg, {difference[1]:.1e} N m")
     assert np.abs(flown["float"][:, 1]).max() == pytest.approx(0.01, abs=1e-8)
     assert np.abs(flown["float"][-50:, 0] - math.radians(20.0)).max() < 1e-4
     assert math.degrees(difference[0]) < 1e-3 and difference[1] < 5e-6
+
+
+def designed(system: StateSpace) -> dict[str, Any]:
+    """As `sil design` writes it."""
+    C = fitted(discretised(system, 0.1))
+    values = {"A": C.A.tolist(), "B": C.B[:, 0].tolist(), "C": C.C[0].tolist(), "D": float(C.D[0, 0])}
+    return values | {"period_us": 100_000, "state_bits": 28}
+
+
+@pytest.mark.parametrize(
+    ("name", "system", "J", "limit", "bits"),
+    [
+        ("Glover-McFarlane with integral", glover(Shape(0.8, integral=0.03), 0.6).compensator, 1.0, 1.0, 30),
+        ("the same, 400 kg m^2", glover(Shape(0.8, integral=0.03), 0.6).compensator, 400.0, 40.0, 25),
+        ("LQG with integral", lqg_design(Weights(0.3, 1.5, 0.2), 0.5), 0.01, 0.01, 30),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_fixed_and_float_fly_what_is_designed_alike(
+    name: str, system: StateSpace, J: float, limit: float, bits: int
+) -> None:
+    """120 s at T_s 0.1, readings half a second old, a step of 20 deg that takes the torque to its limit."""
+    values = designed(system) | {"gain": J, "torque_limit": limit, "torque_bits": bits}
+    flown = {form: closed_loop(form, math.radians(20.0), 1200, J, delay=5, **values) for form in FORMS}
+    difference = np.abs(flown["fixed"] - flown["float"]).max(axis=0)
+    order = len(values["A"])
+    print(f"{name}: order {order}, {math.degrees(difference[0]):.1e} deg, {difference[1] / limit:.1e} of the limit")
+    assert np.abs(flown["float"][-50:, 0] - math.radians(20.0)).max() < math.radians(0.5)
+    assert math.degrees(difference[0]) < 1e-4 and difference[1] < 1e-5 * limit
 
 
 @pytest.mark.parametrize("form", FORMS)
