@@ -23,12 +23,12 @@ from sil.schedule import read_schedule
 GOLDEN = Path(__file__).parents[2] / "golden"
 NAMES = [info.name for info in list_scenarios()]
 EXPECTED = [
-    "appc-rs232", "appc-udp", "mrac-as-printed", "mrac-as-printed-limited", "mrac-as-printed-no-delay", "mrac-rs232",
-    "pd-root-locus", "rigid-open-loop",
+    "appc-rs232", "appc-udp", "fvsc-rs232", "mrac-as-printed", "mrac-as-printed-limited", "mrac-as-printed-no-delay",
+    "mrac-rs232", "pd-root-locus", "rigid-open-loop",
 ]  # fmt: skip
 
 
-def test_all_eight_are_there() -> None:
+def test_all_are_there() -> None:
     assert NAMES == EXPECTED
 
 
