@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from protocol.law_tables import LAWS
 from sil.campaign import provenance
 from sil.campaign.conditions import Conditions, Spec
 from sil.campaign.figures import percentiles
@@ -41,6 +40,7 @@ LAW, TRANSPORT, SENSOR, LINK, SEED = KEYS = (
 )
 ERROR, DIVERGED = "rms_error_deg.max", "diverged_at_s"
 SETTLED_TICKS = 20  # the start is not pointing
+USUAL_LAWS = ("appc", "mrac", "pd")
 INDEPENDENT = 1.0  # burst length of losses that know nothing of each other
 
 
@@ -76,9 +76,13 @@ Flies = Callable[[Mapping[str, Any]], bool]
 
 
 def default_laws(scenario: Scenario) -> tuple[str, ...]:
-    """The scenario's own law first, then the others of the product."""
+    """The scenario's own law first, then those whose defaults are for the satellite that scenarios fly by default."""
     own = scenario.law.name
-    return (own, *(name for name in sorted({table.name for table in LAWS.values()}) if name != own))
+    return (own, *(name for name in USUAL_LAWS if name != own and any(_allowed(scenario, name, _transports(scenario)))))
+
+
+def _transports(scenario: Scenario, more: Sequence[int] = ()) -> tuple[int, ...]:
+    return tuple(dict.fromkeys((scenario.transport_delay_ticks, *more)))
 
 
 def preset(scenario: Scenario, wanted: Wanted) -> tuple[Conditions, Flies]:
@@ -86,13 +90,17 @@ def preset(scenario: Scenario, wanted: Wanted) -> tuple[Conditions, Flies]:
     if not scenario.sensors.attitude.enabled:
         raise UsageError("faults: expected sensors.attitude that is enabled, got none: its delay is an axis of the map")
     own = scenario.transport_delay_ticks
-    allowed = {law: _allowed(scenario, law, (own, *wanted.transports)) for law in wanted.laws}
-    if not any(allowed.values()):
-        raise UsageError(f"faults: expected a law that flies this scenario, got {', '.join(wanted.laws)}, which do not")
-    transports = list(dict.fromkeys(n for n in (own, *wanted.transports) if any(n in ns for ns in allowed.values())))
+    _refuse_what_overrides(scenario)
+    _refuse_places(scenario, wanted)
+    allowed = {law: _allowed(scenario, law, _transports(scenario, wanted.transports)) for law in wanted.laws}
+    for law, those in allowed.items():
+        if not those:
+            why = _why_not(scenario, law, own)
+            raise UsageError(f"faults: expected a law that flies this scenario, got {law}: {why}")
+    transports = [n for n in _transports(scenario, wanted.transports) if any(n in ns for ns in allowed.values())]
     undelayed = _delayed(scenario, 0)
     specs = {
-        LAW: [law for law in wanted.laws if allowed[law]],
+        LAW: list(wanted.laws),
         TRANSPORT: transports,
         SENSOR: [_delayed(scenario, ticks) for ticks in dict.fromkeys((0, *wanted.delays))],
         LINK: list(_links(wanted)),
@@ -108,18 +116,49 @@ def preset(scenario: Scenario, wanted: Wanted) -> tuple[Conditions, Flies]:
 
 def _allowed(scenario: Scenario, law: str, transports: Sequence[int]) -> tuple[int, ...]:
     """The transport delays, of these, that the law flies with."""
+    return tuple(n for n in transports if not _why_not(scenario, law, n))
 
-    directory = Path(provenance.directory_of(scenario))
 
-    def may(n: int) -> bool:
-        sets = sets_of({LAW: law, TRANSPORT: n})
-        base = {**scenario.resolved(), "out": None}
+def _why_not(scenario: Scenario, law: str, n: int) -> str:
+    """Why the law does not fly with a transport delay of n ticks; "": it does."""
+    try:
+        found = check(_with(scenario, {LAW: law, TRANSPORT: n}))
+    except ScenarioInvalid as error:
+        return _first(error)
+    return next((f"{one.key}: {one.expected}" for one in found if one.severity == "error"), "")
+
+
+def _with(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:
+    """The scenario at one place. Raises ScenarioInvalid."""
+    base, directory = {**scenario.resolved(), "out": None}, Path(provenance.directory_of(scenario))
+    return load_values(base, sets_of(values), "scenario", directory)
+
+
+def _first(error: ScenarioInvalid) -> str:
+    problem = error.problems[0]
+    return f"{problem.key}: expected {problem.expected}, got {problem.got}"
+
+
+def _refuse_what_overrides(scenario: Scenario) -> None:
+    """Loss of one direction would stay whatever the map says of both."""
+    for name in ("up", "down"):
+        way = getattr(scenario.link.faults, name)
+        for key in ("drop", "burst"):
+            if getattr(way, key) is not None:
+                raise UsageError(f"faults: expected no link.faults.{name}.{key}: the map varies loss, both ways alike")
+
+
+def _refuse_places(scenario: Scenario, wanted: Wanted) -> None:
+    """What the scenario does not admit beside its own faults, or no chain of bursts can do, is said before it flies."""
+    places = [(f"--delay {ticks}", {SENSOR: _delayed(scenario, ticks)}) for ticks in wanted.delays]
+    for loss in wanted.losses:
+        for burst in wanted.bursts:
+            places.append((f"--loss {loss:g} --burst {burst:g}", {LINK: _link(loss, burst)}))
+    for said, values in places:
         try:
-            return all(found.severity != "error" for found in check(load_values(base, sets, "scenario", directory)))
-        except ScenarioInvalid:
-            return False
-
-    return tuple(n for n in dict.fromkeys(transports) if may(n))
+            _with(scenario, values)
+        except ScenarioInvalid as error:
+            raise UsageError(f"faults: {said}: {_first(error)}") from None
 
 
 def _delayed(scenario: Scenario, ticks: int) -> list[dict[str, Any]]:
@@ -132,10 +171,13 @@ def _links(wanted: Wanted) -> Iterator[dict[str, Any]]:
     yield {"drop": 0.0, "burst": None}
     for loss in wanted.losses:
         for burst in wanted.bursts:
-            if burst == INDEPENDENT:
-                yield {"drop": loss, "burst": None}
-            else:
-                yield {"drop": 0.0, "burst": {"share": loss, "mean_ticks": burst}}
+            yield _link(loss, burst)
+
+
+def _link(loss: float, burst: float) -> dict[str, Any]:
+    if burst == INDEPENDENT:
+        return {"drop": loss, "burst": None}
+    return {"drop": 0.0, "burst": {"share": loss, "mean_ticks": burst}}
 
 
 # -- what came of it ---------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 from sil.campaign.records import Record
@@ -15,9 +16,13 @@ FIRST_PLAIN_S = 2.0  # a sweep that is over sooner needs no line
 
 
 class Terminal(SweepWatch):
-    """Draws only when asked to wait or told of a point; costs nothing in between."""
+    """Draws only when asked to wait or told of a point; costs nothing in between.
 
-    def __init__(self) -> None:
+    names: what a run that ended with this exit code is called, if not by its verdict.
+    """
+
+    def __init__(self, names: Mapping[int, str] | None = None) -> None:
+        self._names = names or {}
         self._live = sys.stderr.isatty()
         self._bar: Any = None
         self._bad: Counter[str] = Counter()
@@ -39,7 +44,7 @@ class Terminal(SweepWatch):
     def record(self, record: Record) -> None:
         self._flown += 1
         if record.exit_code:
-            self._bad[record.verdict] += 1
+            self._bad[self._names.get(record.exit_code, record.verdict)] += 1
 
     def note(self, line: str) -> None:
         if self._bar is not None:

@@ -19,10 +19,10 @@ from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import FuncFormatter
 
 from sil.report.colours import LIGHT, Look
-from sil.report.look import empty, headed
+from sil.report.look import WIDTH_in, empty, headed
 
 LEFT_in, RIGHT_in, TOP_in, BOTTOM_in, GAP_X_in, GAP_Y_in = 1.15, 1.35, 1.6, 1.15, 0.25, 0.78
-ROW_in = 1.75
+ROW_in, COLUMN_in = 1.75, 2.6
 TITLE_in, ROW_TITLE_in = 0.44, 0.12  # above a panel
 MARGIN_in = 0.35
 FRAME = "#D55E00"
@@ -70,7 +70,9 @@ class Page(NamedTuple):
 def heat_maps(page: Page, panels: Sequence[Panel], look: Look = LIGHT) -> Figure:
     """The page."""
     height = TOP_in + BOTTOM_in + len(page.rows) * ROW_in + (len(page.rows) - 1) * GAP_Y_in
-    figure = empty(height, look)
+    count = len(page.columns)
+    width = LEFT_in + RIGHT_in + count * COLUMN_in + (count - 1) * GAP_X_in
+    figure = empty(height, look, max(WIDTH_in, width))  # numbers stay readable, however many laws there are
     headed(figure, page.heading, page.facts, MARGIN_in / figure.get_figwidth(), look)
     norm = _norm([place.value for panel in panels for place in panel.places])
     flown = [panel for panel in panels if panel.places]

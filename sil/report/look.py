@@ -19,9 +19,9 @@ DASHED, DOTTED = (0, (5, 3)), ":"
 _POINTS_MAX = 6000  # per line: more than a page can show
 
 
-def empty(height: float, look: Look) -> Figure:
-    """A page without anything on it."""
-    figure = Figure(figsize=(WIDTH_in, height), dpi=DPI, facecolor=look.paper)
+def empty(height: float, look: Look, width: float = WIDTH_in) -> Figure:
+    """A page without anything on it, in inches."""
+    figure = Figure(figsize=(width, height), dpi=DPI, facecolor=look.paper)
     FigureCanvasAgg(figure)
     return figure
 

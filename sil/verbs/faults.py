@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, UsageError
+from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, UsageError
 from sil.verbs import completion
 from sil.verbs.options import JsonOption, QuietOption, SetOption, print_json
-from sil.verbs.sweep import base_of, interruptible, watch_of
+from sil.verbs.sweep import base_of, interruptible
 
 if TYPE_CHECKING:
     from sil.campaign.margin import Cell
     from sil.campaign.plan import Plan
     from sil.campaign.results import Results
+    from sil.campaign.sweep import SweepWatch
     from sil.scenario import Scenario
 
 MAP_PANEL = "What the map is over"
@@ -41,7 +42,7 @@ def faults(
         typer.Option(
             "--law",
             metavar="NAME",
-            help="A law to fly; repeatable. Default: the scenario's own, and the others of the product.",
+            help="A law to fly; repeatable. Default: the scenario's own, and of appc, mrac and pd those that fly it.",
             rich_help_panel=MAP_PANEL,
         ),
     ] = None,
@@ -148,7 +149,7 @@ def faults(
         seeds,
     )
     conditions, flies = preset(base, wanted)
-    watch = watch_of(as_json, quiet)
+    watch = _watch(as_json, quiet)
     return interruptible(
         lambda: _fly(new_sweep(base, conditions, out, watch, flies, f"{base.name}-faults"), workers, as_json, quiet)
     )
@@ -161,6 +162,14 @@ def _base(name: str, sets: list[str]) -> Scenario:
     if not own.metrics.from_tick:
         before.append(f"metrics.from_tick={min(START_TICKS, own.ticks - 1)}")
     return base_of(name, [*before, *sets], [], None, None, None)
+
+
+def _watch(as_json: bool, quiet: bool) -> SweepWatch:
+    """Of a sweep without requirements: what did not pass is lost."""
+    from sil.campaign.progress import Terminal
+    from sil.campaign.sweep import SweepWatch
+
+    return SweepWatch() if as_json or quiet else Terminal({EXIT_REQUIREMENT: "lost"})
 
 
 def _known(opened: Results) -> Results:
@@ -177,7 +186,7 @@ def _fly(opened: Results, workers: int | None, as_json: bool, quiet: bool) -> in
     from sil.campaign.margin_map import PNG, write
     from sil.campaign.sweep import fly
 
-    summary = fly(opened, workers, "none", watch_of(as_json, quiet))
+    summary = fly(opened, workers, "none", _watch(as_json, quiet))
     cells = write(opened)
     failed = sum(cell.failed for cell in cells)
     code = EXIT_INTERRUPTED if summary["interrupted"] else EXIT_LINK if failed else EXIT_OK
@@ -197,7 +206,7 @@ def _fly(opened: Results, workers: int | None, as_json: bool, quiet: bool) -> in
 
 
 def _show(plan: Plan, cells: Sequence[Cell]) -> None:
-    """For each law and delay: the error without loss, and the worst place that lost no run."""
+    """For each law and delay: the error without loss, of the place in the middle, and of the worst one."""
     from rich.console import Console
     from rich.table import Table
 

@@ -9,7 +9,18 @@ import math
 
 import pytest
 
-from sil.campaign.margin import INDEPENDENT, LINK, SENSOR, Wanted, as_json, cells_of, csv_text, is_map, preset
+from sil.campaign.margin import (
+    INDEPENDENT,
+    LINK,
+    SENSOR,
+    Wanted,
+    as_json,
+    cells_of,
+    csv_text,
+    default_laws,
+    is_map,
+    preset,
+)
 from sil.campaign.margin_map import draw, page_of
 from sil.campaign.plan import make_plan, read_plan
 from sil.campaign.records import Record, broken
@@ -114,6 +125,23 @@ def test_a_map_of_which_little_is_finished_is_drawn_too(plan, tmp_path):
     draw(plan, cells_of(plan, {1: broken(1, "gone")}), tmp_path / "none.png")
 
 
+def test_bursts_that_no_chain_can_make_are_refused_before_anything_flies():
+    with pytest.raises(UsageError, match=r"--loss 0.7 --burst 1.2: .*share.*at most 0.5455"):
+        planned(WANTED._replace(losses=(0.1, 0.7), bursts=(1.2,)))
+
+
+def test_the_usual_laws_are_those_that_fly_the_scenario():
+    assert default_laws(load_scenario("mrac-rs232", SETS)) == ("mrac", "appc", "pd")
+    assert default_laws(load_scenario("pd-root-locus", [*SETS, "period_s=2"])) == ("pd",)
+
+
+def test_numbers_stay_readable_however_many_laws_there_are(plan):
+    page, panels = page_of(plan, cells_of(plan, all_flown(plan)))
+    many = [panel._replace(column=column) for column in range(9) for panel in panels if panel.column == 0]
+    figure = heat_maps(page._replace(columns=tuple("abcdefghi")), many)
+    assert min(ax.get_position().width for ax in figure.axes[:-1]) * figure.get_figwidth() > 2.5
+
+
 def test_other_sweeps_are_no_map(plan):
     assert is_map(plan)
     assert not is_map(make_plan(load_scenario("appc-rs232"), _seeds()))
@@ -129,7 +157,11 @@ def _seeds():
     ("sets", "laws", "told"),
     [
         (["sensors.attitude.enabled=false"], ("pd",), "sensors.attitude"),
-        (["period_s=2"], ("appc",), "a law that flies"),
+        (["period_s=2"], ("appc",), "a law that flies this scenario, got appc: "),
+        ([], ("appc", "nope"), "a law that flies this scenario, got nope: law.name"),
+        (["sensors.attitude.faults=[{kind: delayed, delay_s: 1}]"], ("pd",), "--delay 2: .*no overlap with faults.0."),
+        (["link.faults.up.drop=0.5"], ("pd",), "no link.faults.up.drop"),
+        (["link.faults.down.burst={share: 0.1, mean_ticks: 2}"], ("pd",), "no link.faults.down.burst"),
     ],
 )
 def test_what_no_map_can_be_made_of(sets, laws, told):
