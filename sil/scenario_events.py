@@ -17,6 +17,7 @@ from sil.scenario_errors import Path
 from sil.scenario_sections import Expected, Lapse, Moment, Numbers3, Section, numbers_of
 
 MOST_DEG = 360e6
+MOST_EVENTS = 1000  # and faults of an instrument: each is held against every other
 DISCONNECT, RESTART, SETPOINT = "link.disconnect", "board.restart", "setpoint"
 
 
@@ -77,6 +78,9 @@ def time_findings(path: Path, at_s: float, for_s: float | None, period_us: int, 
 
 def findings(events: Sequence[Event], board: str, period_us: int, ticks: int) -> Iterator[Finding]:
     """What one event alone, or one beside another, cannot mean."""
+    if len(events) > MOST_EVENTS:
+        yield Finding(("events",), f"at most {MOST_EVENTS} events", len(events))
+        return
     for index, event in enumerate(events):
         path: Path = ("events", index)
         yield from time_findings(path, event.at_s, event.for_s, period_us, ticks)

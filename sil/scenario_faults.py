@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from protocol import events as codes
 from sil.scenario_errors import Path
-from sil.scenario_events import Finding, Span, span, time_findings
+from sil.scenario_events import MOST_EVENTS, Finding, Span, span, time_findings
 from sil.scenario_instruments import AXES, BIASES, Actuators, Fault, Sensors
 
 KINDS = ("off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
@@ -68,6 +68,10 @@ def findings(sensors: Sensors, actuators: Actuators, period_us: int, ticks: int)
         name, path, faults, enabled = instrument
         if faults and not enabled:
             yield _of_nobody(instrument, actuators)
+        if len(faults) > MOST_EVENTS:
+            yield Finding(path, f"at most {MOST_EVENTS} faults of an instrument", len(faults))
+            continue
+        when = [span(fault.at_s, fault.for_s, period_us, ticks) for fault in faults]
         for index, fault in enumerate(faults):
             here = (*path, index)
             yield from _times(here, fault, period_us, ticks)
@@ -77,7 +81,7 @@ def findings(sensors: Sensors, actuators: Actuators, period_us: int, ticks: int)
             if name == actuators.kind and fault.kind == "garbage":
                 yield from _of_actuators(here, fault, actuators)
             for other, before in enumerate(faults[:index]):
-                if _contradict(before, fault) and _meet(before, fault, period_us, ticks):
+                if _overlap(when[other], when[index]) and _share_an_axis(before, fault) and _contradict(before, fault):
                     yield Finding(
                         (*here, "kind"), f"no overlap with {path[-1]}[{other}], which is {before.kind}", fault.kind
                     )
@@ -139,7 +143,9 @@ def _contradict(one: Fault, other: Fault) -> bool:
     return kinds[0] == kinds[1] or "off" in kinds or all(kind in REPLACES for kind in kinds)
 
 
-def _meet(one: Fault, other: Fault, period_us: int, ticks: int) -> bool:
-    when: list[Span] = [span(each.at_s, each.for_s, period_us, ticks) for each in (one, other)]
-    same_axis = set(one.axis or AXES) & set(other.axis or AXES)
-    return bool(same_axis) and when[0].first < when[1].end and when[1].first < when[0].end
+def _overlap(one: Span, other: Span) -> bool:
+    return one.first < other.end and other.first < one.end
+
+
+def _share_an_axis(one: Fault, other: Fault) -> bool:
+    return bool(set(one.axis or AXES) & set(other.axis or AXES))

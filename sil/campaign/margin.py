@@ -128,7 +128,7 @@ def _why_not(scenario: Scenario, law: str, n: int) -> str:
     return next((f"{one.key}: {one.expected}" for one in found if one.severity == "error"), "")
 
 
-def _with(scenario: Scenario, values: Mapping[str, Any]) -> Scenario:
+def _with(scenario: Scenario, values: dict[str, Any]) -> Scenario:
     """The scenario at one place. Raises ScenarioInvalid."""
     base, directory = {**scenario.resolved(), "out": None}, Path(provenance.directory_of(scenario))
     return load_values(base, sets_of(values), "scenario", directory)
@@ -150,6 +150,7 @@ def _refuse_what_overrides(scenario: Scenario) -> None:
 
 def _refuse_places(scenario: Scenario, wanted: Wanted) -> None:
     """What the scenario does not admit beside its own faults, or no chain of bursts can do, is said before it flies."""
+    places: list[tuple[str, dict[str, Any]]]
     places = [(f"--delay {ticks}", {SENSOR: _delayed(scenario, ticks)}) for ticks in wanted.delays]
     for loss in wanted.losses:
         for burst in wanted.bursts:

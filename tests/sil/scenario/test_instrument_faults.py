@@ -8,6 +8,7 @@ from protocol import events as codes
 from sil import scenario_faults
 from sil.checks import check_scenario
 from sil.scenario import load_values
+from sil.scenario_errors import ScenarioInvalid
 from sil.sinks.events import describe
 
 A, Q, R, W = "sensors.attitude", "sensors.quaternion", "sensors.rate", "actuators.wheels"
@@ -113,3 +114,17 @@ def test_what_the_log_will_say():
     )
     assert lines[1] == ("info", "FAULT_ENDS: it works again (of: attitude sensor, kind: stuck)")
     assert lines[2][1].endswith("(of: wheels, kind: wrong)")
+
+
+def test_thousands_of_faults_or_events_are_one_line_and_not_minutes():
+    """Each is held against every other, so their number is bounded."""
+    faults = [{"kind": "stuck", "at_s": float(at), "for_s": 0.5} for at in range(1001)]
+    events = [{"do": "link.disconnect", "at_s": float(at), "for_s": 0.5} for at in range(1001)]
+    for values, said in (
+        ({"sensors": {"attitude": {"faults": faults}}}, "sensors.attitude.faults: expected at most 1000 faults"),
+        ({"events": events}, "events: expected at most 1000 events"),
+    ):
+        with pytest.raises(ScenarioInvalid) as refused:
+            load_values({"duration_s": 2000, **values})
+        assert len(refused.value.problems) == 1 and said in str(refused.value)
+    load_values({"duration_s": 2000, "sensors": {"attitude": {"faults": faults[:1000]}}, "events": events[:1000]})
