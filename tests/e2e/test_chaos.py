@@ -145,7 +145,7 @@ def test_a_board_that_never_goes_on_is_a_clear_line(cli, kind):
 
 def test_workers_of_a_sweep_that_stood_still_for_a_while_change_nothing(cli):
     """What is longer than a while is a line, then a failed point: tests/sil/campaign/test_worker.py."""
-    sweep = ("sweep", "pd-root-locus", "--vary", "seed=1:12", "--set", "sensors.attitude.noise_deg=0.01", "-j", "2")
+    sweep = ("sweep", "pd-root-locus", "--vary", "seed=1:6", "--set", "sensors.attitude.noise_deg=0.01", "-j", "2")
     cli(*sweep, "--set", "require=[]", "--out", "clean")
     run = cli.start(*sweep, "--set", "require=[]", "--out", "stopped")
     flown = cli.folder / "stopped" / "results.jsonl"
