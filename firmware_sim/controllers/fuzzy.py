@@ -35,12 +35,13 @@ def table_float(par: np.ndarray, first: int, a: float) -> float:
     """The table par[first : first + 65] at 0 <= a <= 1."""
     i = min(int(64.0 * a), 63)
     low: float = par[first + i]
-    return low + (par[first + i + 1] - low) * (64.0 * a - i)
+    high: float = par[first + i + 1]
+    return low + (high - low) * (64.0 * a - i)
 
 
 @callee
 def table_fixed(par: np.ndarray, first: int, a: int) -> int:
     """The table par[first : first + 65], Q15, at 0 <= a <= 1 in Q15."""
     i = min(div_trunc(a, 512), 63)
-    low = par[first + i]
+    low: int = par[first + i]
     return low + mul_q(par[first + i + 1] - low, a - mul_q(i, 512, 0), 9)

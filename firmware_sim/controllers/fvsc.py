@@ -17,6 +17,7 @@ Source: paper 000, experiments 1 to 3; study of paper 000, sections 3 and 3.1.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -196,7 +197,7 @@ class Fvsc(CompiledLaw):
 
     STATE, PAR = STATE, PAR
     RANGES = ranges_of(FVSC.telemetry)
-    WORDS: tuple[tuple[int, float], ...] = (
+    WORDS: ClassVar[tuple[tuple[int, float], ...]] = (
         *((ERROR + i, 2.0**-29) for i in range(3)),
         *((SWITCHING + i, 2.0**-20) for i in range(3)),
         *((SIGN + i, 1.0) for i in range(3)),
