@@ -30,6 +30,7 @@ from sil.verbs import (
     run,
     scenario,
     sweep,
+    tables,
 )
 from sil.verbs.manual import exit_codes, page_of
 
@@ -76,7 +77,7 @@ def sil(
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
     "Look": (report.info, report.report, report.plot, compare.compare, report.export, report.diff),
-    "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, faults.faults, bench.bench),
+    "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, faults.faults, tables.tables, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }
 for _panel, _verbs in VERBS.items():
