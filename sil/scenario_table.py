@@ -23,7 +23,8 @@ and nothing else differs; `law.params.*` are compared with the defaults of the l
 def non_defaults(scenario: Scenario) -> dict[str, Any]:
     """Key to value of everything that is not the default; `require` and `about` left out."""
     plain = load_values({"law": {"name": scenario.law.name}})
-    mine, default = flat(scenario.resolved()), flat(plain.resolved())
+    values = {key: value for key, value in scenario.resolved().items() if key != "variants"}
+    mine, default = flat(values), flat(plain.resolved())
     if scenario.board != "none":
         default["law.name"] = ""  # always worth a line
     left_out = ("name", "about", "require")
@@ -41,6 +42,8 @@ def markdown() -> str:
 def _rows(scenario: Scenario) -> Iterator[str]:
     for key, value in non_defaults(scenario).items():
         yield f"| {scenario.name} | `{key}` | {_text(value)} |\n"
+    for name, variant in scenario.variants.items():
+        yield f"| {scenario.name} | variant `{name}` | {variant.get('about', '')} |\n"
     for line in scenario.require:
         bounds = line.model_dump(exclude={"metric"}, exclude_none=True)
         said = " ".join(f"{word} {_text(value)}" for word, value in bounds.items())

@@ -29,9 +29,9 @@ class Table(NamedTuple):
     rows: tuple[Printed, ...]
 
     def sampling_at(self, delay_s: float) -> dict[str, Any]:
-        """sensors.sampling with this delay; a unit delay of 0 is none."""
-        kind = self.sampling["delay"] if delay_s else "transport"
-        return {**self.sampling, "delay_s": delay_s, "delay": kind}
+        """sensors.sampling with this delay; where the study has a unit delay, none is no sensor unit at all."""
+        none = {"period_s": None, "delay": "transport"} if self.sampling["delay"] == "unit" and not delay_s else {}
+        return {**self.sampling, "delay_s": delay_s, **none}
 
 
 _HOLD = "the hold of 0.1 s alone makes the printed PD swing between its limits, the delay of 0.01 s adds nothing"
