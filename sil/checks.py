@@ -17,7 +17,7 @@ from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
 from protocol.laws import IN_C
 from sil import scenario_law as laws
 from sil.boards import FIRMWARE, WITHOUT_TIMER
-from sil.configure import orders
+from sil.configure import Orders, orders
 from sil.instruments import ages_s
 from sil.scenario import Scenario, load_scenario
 from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
@@ -112,7 +112,7 @@ def _law(scenario: Scenario) -> Iterator[Finding]:
     if len(made.words) > MAX_WORDS:
         got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
         yield _error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
-    found = [*_law_form(scenario), *_law_period(scenario), *_law_delay(scenario)]
+    found = [*_law_form(scenario), *_law_period(scenario), *_law_delay(scenario), *_law_momentum(scenario, made)]
     yield from found
     reason = refusal(made.configuration)
     if reason is not None and not found:
@@ -129,6 +129,13 @@ def _law_period(scenario: Scenario) -> Iterator[Finding]:
     if not low <= scenario.period_s <= high:
         expected = f"a number in s from {low:g} to {high:g} for law {scenario.law.name}"
         yield _error(scenario, "period_s", expected, shown(scenario.period_s))
+
+
+def _law_momentum(scenario: Scenario, made: Orders) -> Iterator[Finding]:
+    """A law that reads in the wheels' momentum what torque acted would read there that thrusters never do anything."""
+    if scenario.actuators.kind != "wheels" and made.configuration.params.get("recover_torque"):
+        expected = f"false with actuators.kind {scenario.actuators.kind}, whose torque does not show in the momentum"
+        yield _error(scenario, "law.params.recover_torque", expected, "true")
 
 
 def _law_delay(scenario: Scenario) -> Iterator[Finding]:

@@ -24,7 +24,7 @@ STRUCTS: dict[str, tuple[str, tuple[Field, ...], tuple[Field, ...]]] = {
     "reference": ("the reference model, guidance/reference.py", reference.PAR, reference.STATE),
     "pd": ("the law pd, controllers/pd.py", Pd.PAR, Pd.STATE),
     "mrac": ("the law mrac, controllers/mrac.py", Mrac.PAR, Mrac.STATE),
-    "appc": ("the law appc, controllers/appc.py", Appc.PAR, Appc.STATE),
+    "appc": ("the law appc, controllers/appc_observer.py", Appc.PAR, Appc.STATE),
     "fvsc": ("the laws fvsc, vsc and ifvsc, controllers/fvsc.py", Fvsc.PAR, Fvsc.STATE),
     "state_space": ("the law state_space, controllers/state_space.py", StateSpace.PAR, StateSpace.STATE),
 }

@@ -1,4 +1,4 @@
-/* The law appc, fixed form; firmware_sim/controllers/appc.py has the same functions and the equations. */
+/* The law appc, fixed form; controllers/appc.py and appc_observer.py have the same functions and the equations. */
 #include "appc.h"
 
 #include "fixed.h"
@@ -10,7 +10,7 @@
 
 #define START_STEPS 4
 #define LEARN_FROM 25
-#define STEPS_MAX 1000000
+#define STEPS_MAX 1000000 /* and of the ticks of a gap */
 
 /* -- parameters and initial state -- */
 
@@ -31,9 +31,11 @@ static bool appc_init(void *memory, const int32_t *common, const int32_t *params
     par->l3 = (int32_t)mul_q(qo2, qo, 30);
     par->adapt = params[APPC_ADAPT];
     par->gyro = params[APPC_GYRO];
+    par->recover = params[APPC_RECOVER_TORQUE];
     par->orbit = (int32_t)mul_q(mul_q(params[APPC_ORBIT_RATE_RADPS], par->ts, 32), INV_TWO_PI_Q34, 34);
     par->torque_shift = common[COMMON_TORQUE_BITS] - 28;
     par->momentum_shift = common[COMMON_MOMENTUM_BITS] - 28;
+    par->momentum_max = sat32(shift_round(INT32_MAX, par->momentum_shift));
     torque_limits(common, par->limit);
     torque_scales(period_us, &params[APPC_INERTIA_KGM2_X], par->torque_of, par->drive_of, par->demand_shift,
                   par->drive_shift);
@@ -98,6 +100,41 @@ static void propagate(appc_state *s, const appc_par *par) {
         s->v[i] = keep32(wide(s->v[i]) + alpha[i], &s->arithmetic);
         s->momentum[i] = keep32(momentum_after(s, par, i), &s->arithmetic);
         s->innovation[i] = 0;
+    }
+    s->gap = (int32_t)smaller(s->gap + 1, STEPS_MAX);
+}
+
+/* dU of axis i: what the torque of a gap was more than guessed, summed up; from the momentum of the wheels. */
+static int32_t missed(const appc_state *s, const appc_par *par, const law_input *in, int i) {
+    int32_t h = sat32(shift_round(in->momentum[i], par->momentum_shift));
+    if (h >= par->momentum_max || h <= -par->momentum_max) {
+        return 0;
+    }
+    return sat32(mul_q(sub_sat(s->momentum[i], h), par->ts_inv, 28));
+}
+
+/* The prediction for t_k as it would be had the torque of the gap been known. */
+static void recover(appc_state *s, const appc_par *par, const law_input *in) {
+    static const int32_t AT_REST[3] = {0, 0, 0};
+    const int32_t lost = s->gap - 1; /* gap: ticks since a reading */
+    int32_t torque[3], dv[3];
+    s->gap = 0;
+    if (lost <= 0 || par->recover == 0 || in->applied_known == 0) {
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        torque[i] = missed(s, par, in, i);
+        dv[i] = sat32(mul_q(drive(par, i, torque[i]), s->g[i], 28));
+    }
+    forward(s->y, AT_REST, dv, dv);
+    for (int i = 0; i < 3; i++) {
+        int64_t share = div_trunc(torque[i], lost);
+        s->y[i] = wrap32(s->y[i] + mul_q(dv[i], lost, 5));
+        s->v[i] = keep32(wide(s->v[i]) + dv[i], &s->arithmetic);
+        s->applied[i] = add_sat(s->applied[i], share);
+        if (lost > 1) {
+            s->applied_before[i] = add_sat(s->applied_before[i], share);
+        }
     }
 }
 
@@ -199,6 +236,7 @@ static void appc_step(void *memory, const law_input *in, reference *ref, law_out
         propagate(s, par);
     }
     if (in->fresh != 0) {
+        recover(s, par, in);
         correct(s, par, in);
     }
     int32_t seen[3];

@@ -23,7 +23,18 @@ LAWS: dict[str, str] = {
     "predictor": "firmware_sim.controllers.predictor:Predictor",
 }
 # Files of this folder that are not laws.
-SUPPORT = ("attitude_error", "compiled", "fuzzy", "gain", "gyroscopic", "inputs", "kinematics", "rls", "user")
+SUPPORT = (
+    "appc_observer",
+    "attitude_error",
+    "compiled",
+    "fuzzy",
+    "gain",
+    "gyroscopic",
+    "inputs",
+    "kinematics",
+    "rls",
+    "user",
+)
 
 
 class Law(Protocol):

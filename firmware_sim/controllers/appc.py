@@ -4,17 +4,17 @@ Angles eta = [phi, theta, psi]; y^, v^, w^: attitude, rate per sample and distur
 u(k): torque that acts from t_k on, u(k) = command(k-1) unless the laboratory reports otherwise; I = I0 / g;
 FWD, INV: kinematics.py; Gamma: gyroscopic torque at the same instant, 0 without `gyro`. At tick k:
 
-    1 observe   alpha = FWD(y^, v^, (u(k-1) - Gamma) T_s^2 / I) + w^; y^ += v^ + alpha/2; v^ += alpha
-                e = y(k) - y^;  y^ += L1 e; v^ += L2 e; w^ += L3 e          (skipped without a reading)
+    1 observe   y^, v^, w^ propagated from t_(k-1) with u(k-1), then corrected by y(k)          (appc_observer.py)
     2 adapt     z = y(k) - 2 y(k-1) + y(k-2);  x = INV(y^(k-1), v^(k-1), z);  c = (u(k-1) + u(k-2)) T_s^2 / (2 I0)
                 both filtered; g from x = c g by recursive least squares                                 (gain.py)
-    3 predict   y', v' for t_(k+1) as in 1 with u(k)
+    3 predict   y', v' for t_(k+1) as in 1, with u(k)
     4 place     nu = am - K1 (y' - ym(k+1)) - K2 (v' - vm(k+1)) - w^;  command = clip(I INV(y', v', nu) / T_s^2 + Gamma)
     Gamma       gyroscopic.py; h = wheel momentum as reported, without a SAMPLE propagated by -u T_s
 
 Start: four ticks of zero torque while the observer settles; the reference waits at y^ and then leaves from y^ + v^ with
 rate v^, so the first command does not jump. Adaptation begins at tick 25. Where a reading is lost y^ stands in for it
-in z and the filters go on, so that the noise in z still cancels; g rests until three readings in a row came.
+in z and the filters go on, so that the noise in z still cancels; g rests until three readings in a row came. What acted
+meanwhile is recovered from the wheels' momentum at the next SAMPLE.
 Gains: K1 = (1-pc)^2, K2 = (1-pc)(3+pc)/2 (double pole pc); L = 1-po^3, 1.5 (1-po)^2 (1+po), (1-po)^3 (triple pole po).
 Fixed form: y bam; v, w, accelerations turn36; u, h Q28; g Q28, P Q34; the regression in rad Q35.
 Source: study of paper 004, section 3.1 (there: BEST). Transport delay: exactly one sample. Needs Euler angles.
@@ -27,6 +27,51 @@ import math
 import numpy as np
 
 from firmware_sim import jit
+from firmware_sim.controllers.appc_observer import (
+    ADAPT,
+    APPLIED,
+    ARITHMETIC,
+    BEFORE,
+    COMMAND,
+    DEMAND_SHIFT,
+    DRIVE,
+    DRIVE_OF,
+    G_INV,
+    GYRO,
+    INNOVATION,
+    K1,
+    K2,
+    LIMIT,
+    ORBIT,
+    PAR,
+    READING,
+    READING_BEFORE,
+    RESPONSE,
+    RESTARTED,
+    STATE,
+    STEPS,
+    TORQUE_SHIFT,
+    TS,
+    G,
+    H,
+    P,
+    V,
+    W,
+    Y,
+    acceleration_fixed,
+    acceleration_float,
+    compensation_fixed,
+    correct_fixed,
+    correct_float,
+    drive_fixed,
+    inertia_float,
+    moved_fixed,
+    propagate_fixed,
+    propagate_float,
+    recover_fixed,
+    recover_float,
+    scale_fixed,
+)
 from firmware_sim.controllers.compiled import CompiledLaw, ranges_of, torque_limits_fixed
 from firmware_sim.controllers.gain import (
     learn_fixed,
@@ -36,68 +81,19 @@ from firmware_sim.controllers.gain import (
     washed_fixed,
     washed_float,
 )
-from firmware_sim.controllers.gyroscopic import gyro_fixed, gyro_float
+from firmware_sim.controllers.gyroscopic import gyro_float
 from firmware_sim.controllers.kinematics import (
     IntTriple,
     Triple,
-    forward_fixed,
-    forward_float,
     inverse_fixed,
     inverse_float,
     torque_scales_fixed,
     triple,
 )
-from firmware_sim.fields import Field, offsets
-from firmware_sim.fixed import add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
+from firmware_sim.fixed import INT32_MAX, add_sat, clip, div_trunc, keep32, mul_q, sat32, shift_round, sub_sat, wrap32
 from firmware_sim.guidance.reference import ACCEL, NEXT, RATE_NEXT, restart_fixed, restart_float, wrap_pi
 from protocol.law_tables import AXES, Configuration
 from protocol.laws.appc import APPC
-
-STATE = (
-    Field("y", 3, "turn", 32),
-    Field("v", 3, "turn/sample", 36),
-    Field("w", 3, "turn/sample^2", 36),
-    Field("g", 3, "1", 28),
-    Field("g_inverse", 3, "1", 28),
-    Field("P", 3, "1", 34),
-    Field("applied", 3, "N m", 28),
-    Field("applied_before", 3, "N m", 28),
-    Field("command", 3, "N m", 28),
-    Field("reading", 3, "turn", 32),
-    Field("reading_before", 3, "turn", 32),
-    Field("innovation", 3, "turn", 32),
-    Field("momentum", 3, "N m s", 28),
-    Field("response", 9, "turn/sample^2", 36),
-    Field("drive", 9, "turn/sample^2", 36),
-    Field("steps", 1, "tick", 0),
-    Field("restarted", 1, "", 0),
-    Field("arithmetic", 1, "", 0),
-)
-(Y, V, W, G, G_INV, P, APPLIED, BEFORE, COMMAND, READING, READING_BEFORE, INNOVATION, H, RESPONSE, DRIVE, STEPS,
- RESTARTED, ARITHMETIC) = offsets(STATE)  # fmt: skip
-
-# Parameters of both forms; mantissas and shifts of the fixed form as in kinematics.py.
-PAR = (
-    Field("ts", 1, "s", 30),
-    Field("ts_inv", 1, "1/s", 28),
-    Field("k1", 1, "1", 30),
-    Field("k2", 1, "1", 30),
-    Field("l1", 1, "1", 30),
-    Field("l2", 1, "1", 30),
-    Field("l3", 1, "1", 30),
-    Field("adapt", 1, "", 0),
-    Field("gyro", 1, "", 0),
-    Field("orbit", 1, "turn/sample", 36),
-    Field("torque_shift", 1, "bit", 0),
-    Field("momentum_shift", 1, "bit", 0),
-    Field("limit", 3, "N m", 28),
-    Field("torque_of", 3, "N m Q28 per turn/sample^2 Q36", 0, shift="demand_shift"),
-    Field("drive_of", 3, "turn/sample^2 Q36 per N m Q28", 0, shift="drive_shift"),
-    Field("demand_shift", 3, "bit", 0),
-    Field("drive_shift", 3, "bit", 0),
-)
-(TS, TS_INV, K1, K2, L1, L2, L3, ADAPT, GYRO, ORBIT, TORQUE_SHIFT, MOMENTUM_SHIFT, LIMIT, TORQUE_OF, DRIVE_OF,
- DEMAND_SHIFT, DRIVE_SHIFT) = offsets(PAR)  # fmt: skip
 
 START_STEPS = 4
 LEARN_FROM = 25
@@ -116,9 +112,10 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         return
     angles, rates = triple(s, Y), triple(s, V)
     if s[STEPS] > 0.0:
-        _propagate_float(s, par)
+        propagate_float(s, par)
     if fresh:
-        _correct_float(s, par, inp)
+        recover_float(s, par, inp)
+        correct_float(s, par, inp)
     seen = triple(inp, 3) if fresh else triple(s, Y)
     if par[ADAPT] != 0.0:
         learn = fresh and inp[1] >= min(3.0, s[STEPS] + 1.0)
@@ -142,49 +139,6 @@ def step_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
 
 
 @jit.callee
-def _acceleration_float(s: np.ndarray, par: np.ndarray) -> Triple:
-    """alpha at (y^, v^) with the torque that acts now."""
-    angles, rates = triple(s, Y), triple(s, V)
-    gyro = (0.0, 0.0, 0.0)
-    if par[GYRO] != 0.0:
-        gyro = gyro_float(_inertia_float(s, par), par[TS], par[ORBIT], angles, rates, triple(s, H))
-    x = (s[APPLIED] - gyro[0]) * s[G] * par[DRIVE_OF]
-    y = (s[APPLIED + 1] - gyro[1]) * s[G + 1] * par[DRIVE_OF + 1]
-    z = (s[APPLIED + 2] - gyro[2]) * s[G + 2] * par[DRIVE_OF + 2]
-    a = forward_float(angles, rates, (x, y, z))
-    return a[0] + s[W], a[1] + s[W + 1], a[2] + s[W + 2]
-
-
-@jit.callee
-def _inertia_float(s: np.ndarray, par: np.ndarray) -> Triple:
-    """I / T_s^2."""
-    return par[TORQUE_OF] / s[G], par[TORQUE_OF + 1] / s[G + 1], par[TORQUE_OF + 2] / s[G + 2]
-
-
-@jit.callee
-def _propagate_float(s: np.ndarray, par: np.ndarray) -> None:
-    alpha = _acceleration_float(s, par)
-    for i in range(3):
-        s[Y + i] += s[V + i] + 0.5 * alpha[i]
-        s[V + i] += alpha[i]
-        s[H + i] -= s[APPLIED + i] * par[TS]
-        s[INNOVATION + i] = 0.0
-
-
-@jit.callee
-def _correct_float(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
-    for i in range(3):
-        if s[STEPS] == 0.0:
-            s[Y + i], s[READING + i], s[READING_BEFORE + i] = inp[3 + i], inp[3 + i], inp[3 + i]
-        e = wrap_pi(inp[3 + i] - s[Y + i])
-        s[INNOVATION + i] = e
-        s[Y + i] += par[L1] * e
-        s[V + i] += par[L2] * e
-        s[W + i] += par[L3] * e
-        s[H + i] = inp[16 + i]
-
-
-@jit.callee
 def _adapt_float(s: np.ndarray, par: np.ndarray, seen: Triple, angles: Triple, rates: Triple, learn: bool) -> None:
     z = second_differences_float(seen, triple(s, READING), triple(s, READING_BEFORE))
     response = inverse_float(angles, rates, z)
@@ -197,13 +151,13 @@ def _adapt_float(s: np.ndarray, par: np.ndarray, seen: Triple, angles: Triple, r
 
 @jit.callee
 def _place_float(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    alpha = _acceleration_float(s, par)
+    alpha = acceleration_float(s, par)
     angles = (s[Y] + s[V] + 0.5 * alpha[0], s[Y + 1] + s[V + 1] + 0.5 * alpha[1], s[Y + 2] + s[V + 2] + 0.5 * alpha[2])
     rates = (s[V] + alpha[0], s[V + 1] + alpha[1], s[V + 2] + alpha[2])
     for i in range(3):
         e = wrap_pi(angles[i] - ref[NEXT + i])
         out[i] = ref[ACCEL + i] - par[K1] * e - par[K2] * (rates[i] - ref[RATE_NEXT + i]) - s[W + i]
-    body, inertia = inverse_float(angles, rates, triple(out, 0)), _inertia_float(s, par)
+    body, inertia = inverse_float(angles, rates, triple(out, 0)), inertia_float(s, par)
     gyro = (0.0, 0.0, 0.0)
     if par[GYRO] != 0.0:
         ts = par[TS]
@@ -231,9 +185,10 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
         return
     angles, rates = triple(s, Y), triple(s, V)
     if s[STEPS] > 0:
-        _propagate_fixed(s, par)
+        propagate_fixed(s, par)
     if fresh:
-        _correct_fixed(s, par, inp)
+        recover_fixed(s, par, inp)
+        correct_fixed(s, par, inp)
     seen = triple(inp, 3) if fresh else triple(s, Y)
     if par[ADAPT] != 0:
         learn = fresh and inp[1] >= min(3, s[STEPS] + 1)
@@ -260,75 +215,13 @@ def step_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray, ref: np.ndarray,
 
 
 @jit.callee
-def _drive_fixed(par: np.ndarray, i: int, torque: int) -> int:
-    """Acceleration, turn36, of a torque Q28 on the inertia I0."""
-    return sat32(mul_q(torque, par[DRIVE_OF + i], par[DRIVE_SHIFT + i]))
-
-
-@jit.callee
-def _scale_fixed(s: np.ndarray, par: np.ndarray) -> IntTriple:
-    """Per axis, torque Q28 of the inertia I0 / g = acceleration (turn36) times this 2^-DEMAND_SHIFT."""
-    x, y = mul_q(par[TORQUE_OF], s[G_INV], 28), mul_q(par[TORQUE_OF + 1], s[G_INV + 1], 28)
-    return x, y, mul_q(par[TORQUE_OF + 2], s[G_INV + 2], 28)
-
-
-@jit.callee
-def _gyro_fixed(s: np.ndarray, par: np.ndarray, angles: IntTriple, rates: IntTriple, h: IntTriple) -> IntTriple:
-    shift = triple(par, DEMAND_SHIFT)
-    return gyro_fixed(_scale_fixed(s, par), shift, par[TS], par[TS_INV], par[ORBIT], angles, rates, h)
-
-
-@jit.callee
-def _acceleration_fixed(s: np.ndarray, par: np.ndarray) -> IntTriple:
-    """alpha at (y^, v^) with the torque that acts now, turn36."""
-    angles, rates = triple(s, Y), triple(s, V)
-    gyro = (0, 0, 0)
-    if par[GYRO] != 0:
-        gyro = _gyro_fixed(s, par, angles, rates, triple(s, H))
-    x = sat32(mul_q(_drive_fixed(par, 0, sub_sat(s[APPLIED], gyro[0])), s[G], 28))
-    y = sat32(mul_q(_drive_fixed(par, 1, sub_sat(s[APPLIED + 1], gyro[1])), s[G + 1], 28))
-    z = sat32(mul_q(_drive_fixed(par, 2, sub_sat(s[APPLIED + 2], gyro[2])), s[G + 2], 28))
-    a = forward_fixed(angles, rates, (x, y, z))
-    return add_sat(a[0], s[W]), add_sat(a[1], s[W + 1]), add_sat(a[2], s[W + 2])
-
-
-@jit.callee
-def _moved_fixed(y: int, v: int, alpha: int) -> int:
-    """y + v + alpha / 2: bam and turn36 to bam."""
-    return wrap32(y + shift_round(shift_round(v, -1) + alpha, 5))
-
-
-@jit.callee
-def _propagate_fixed(s: np.ndarray, par: np.ndarray) -> None:
-    alpha = _acceleration_fixed(s, par)
-    for i in range(3):
-        s[Y + i] = _moved_fixed(s[Y + i], s[V + i], alpha[i])
-        s[V + i] = keep32(s[V + i] + alpha[i], s, ARITHMETIC)
-        s[H + i] = keep32(s[H + i] - mul_q(s[APPLIED + i], par[TS], 30), s, ARITHMETIC)
-        s[INNOVATION + i] = 0
-
-
-@jit.callee
-def _correct_fixed(s: np.ndarray, par: np.ndarray, inp: np.ndarray) -> None:
-    for i in range(3):
-        if s[STEPS] == 0:
-            s[Y + i], s[READING + i], s[READING_BEFORE + i] = inp[3 + i], inp[3 + i], inp[3 + i]
-        e = wrap32(inp[3 + i] - s[Y + i])
-        s[INNOVATION + i] = e
-        s[Y + i] = wrap32(s[Y + i] + mul_q(par[L1], e, 30))
-        s[V + i] = keep32(s[V + i] + mul_q(par[L2], e, 26), s, ARITHMETIC)
-        s[W + i] = keep32(s[W + i] + mul_q(par[L3], e, 26), s, ARITHMETIC)
-        s[H + i] = keep32(shift_round(inp[16 + i], par[MOMENTUM_SHIFT]), s, ARITHMETIC)
-
-
-@jit.callee
 def _adapt_fixed(
     s: np.ndarray, par: np.ndarray, seen: IntTriple, angles: IntTriple, rates: IntTriple, learn: bool
 ) -> None:
     z = second_differences_fixed(seen, triple(s, READING), triple(s, READING_BEFORE))
     response = inverse_fixed(angles, rates, z)
     for i in range(3):
-        drive = _drive_fixed(par, i, s[APPLIED + i]) + _drive_fixed(par, i, s[BEFORE + i])
+        drive = drive_fixed(par, i, s[APPLIED + i]) + drive_fixed(par, i, s[BEFORE + i])
         x = washed_fixed(s, RESPONSE, i, response[i])
         c = washed_fixed(s, DRIVE, i, shift_round(drive, 1))
         if learn and s[STEPS] >= LEARN_FROM:
@@ -338,24 +231,24 @@ def _adapt_fixed(
 
 @jit.callee
 def _place_fixed(s: np.ndarray, par: np.ndarray, ref: np.ndarray, out: np.ndarray) -> None:
-    alpha = _acceleration_fixed(s, par)
+    alpha = acceleration_fixed(s, par)
     angles = (
-        _moved_fixed(s[Y], s[V], alpha[0]),
-        _moved_fixed(s[Y + 1], s[V + 1], alpha[1]),
-        _moved_fixed(s[Y + 2], s[V + 2], alpha[2]),
+        moved_fixed(s[Y], s[V], alpha[0]),
+        moved_fixed(s[Y + 1], s[V + 1], alpha[1]),
+        moved_fixed(s[Y + 2], s[V + 2], alpha[2]),
     )
     rates = (add_sat(s[V], alpha[0]), add_sat(s[V + 1], alpha[1]), add_sat(s[V + 2], alpha[2]))
     for i in range(3):
         e = mul_q(par[K1], wrap32(angles[i] - ref[NEXT + i]), 26)
         f = mul_q(par[K2], sub_sat(rates[i], ref[RATE_NEXT + i]), 30)
         out[i] = keep32(ref[ACCEL + i] - e - f - s[W + i], s, ARITHMETIC)
-    body, scale = inverse_fixed(angles, rates, triple(out, 0)), _scale_fixed(s, par)
+    body, scale = inverse_fixed(angles, rates, triple(out, 0)), scale_fixed(s, par)
     gyro = (0, 0, 0)
     if par[GYRO] != 0:
         hx = sat32(s[H] - mul_q(s[APPLIED], par[TS], 30))
         hy = sat32(s[H + 1] - mul_q(s[APPLIED + 1], par[TS], 30))
         hz = sat32(s[H + 2] - mul_q(s[APPLIED + 2], par[TS], 30))
-        gyro = _gyro_fixed(s, par, angles, rates, (hx, hy, hz))
+        gyro = compensation_fixed(s, par, angles, rates, (hx, hy, hz))
     saturated = 0
     for i in range(3):
         u = keep32(mul_q(body[i], scale[i], par[DEMAND_SHIFT + i]) + gyro[i], s, ARITHMETIC)
@@ -397,9 +290,9 @@ class Appc(CompiledLaw):
         pc, po, ts = v["controller_pole"], v["observer_pole"], v["period_us"] * 1e-6
         gains = [(1 - pc) ** 2, (1 - pc) * (3 + pc) / 2, 1 - po**3, 1.5 * (1 - po) ** 2 * (1 + po), (1 - po) ** 3]
         inertia = configuration.vector("inertia_kgm2")
-        par = [ts, 1 / ts, *gains, v["adapt"], v["gyro"], v["orbit_rate_radps"] * ts, 0.0, 0.0]
-        par += [*configuration.vector("torque_limit"), *(i / ts**2 for i in inertia), *(ts**2 / i for i in inertia)]
-        return par + [0.0] * 6
+        par = [ts, 1 / ts, *gains, v["adapt"], v["gyro"], v["recover_torque"], v["orbit_rate_radps"] * ts, 0.0, 0.0]
+        par += [INT32_MAX * 2.0 ** -v["momentum_bits"], *configuration.vector("torque_limit")]
+        return [*par, *(i / ts**2 for i in inertia), *(ts**2 / i for i in inertia)] + [0.0] * 6
 
     @staticmethod
     def fixed_par(configuration: Configuration) -> list[int]:
@@ -411,6 +304,8 @@ class Appc(CompiledLaw):
         l2 = mul_q(mul_q(qo2, one + p["observer_pole"], 30), 3, 1)
         gains = [mul_q(qc, qc, 30), mul_q(qc, pc + (3 << 30), 31), one - po3, l2, mul_q(qo2, qo, 30)]
         orbit = mul_q(mul_q(p["orbit_rate_radps"], ts, 32), 2734261102, 34)
+        flags = [p["adapt"], p["gyro"], p["recover_torque"]]
         shifts = [common["torque_bits"] - 28, common["momentum_bits"] - 28]
+        limits = [sat32(shift_round(INT32_MAX, shifts[1])), *torque_limits_fixed(common)]
         scales = torque_scales_fixed(period_us, [p[f"inertia_kgm2_{axis}"] for axis in AXES])
-        return [ts, ts_inv, *gains, p["adapt"], p["gyro"], orbit, *shifts, *torque_limits_fixed(common), *scales]
+        return [ts, ts_inv, *gains, *flags, orbit, *shifts, *limits, *scales]

@@ -7,7 +7,7 @@ from protocol.words import INT32_MAX, Word
 
 APPC = LawTable(
     law_id=3,
-    version=1,
+    version=2,
     name="appc",
     params=(
         Word("controller_pole", "", 30, 0, 0.99, 0.7, "double pole of the state feedback"),
@@ -16,6 +16,7 @@ APPC = LawTable(
         flag("gyro", 0, "compensate the gyroscopic torque"),
         *INERTIA_WORDS,
         Word("orbit_rate_radps", "rad/s", 38, 0, 0.007, 1.0830778e-3, "orbital rate w0, used with gyro"),
+        flag("recover_torque", 1, "after lost SAMPLEs, take from the wheels' momentum what torque acted"),
     ),
     telemetry=(
         *vector("g", "", 28, 0.6, 1.7, (1, 1, 1), "identified gain: inertia is inertia_kgm2 / g"),

@@ -121,9 +121,11 @@ typedef struct {
     int32_t l3;              /* 1 Q30 */
     int32_t adapt;
     int32_t gyro;
+    int32_t recover;
     int32_t orbit;           /* turn/sample Q36 */
     int32_t torque_shift;    /* bit */
     int32_t momentum_shift;  /* bit */
+    int32_t momentum_max;    /* N m s Q28 */
     int32_t limit[3];        /* N m Q28 */
     int32_t torque_of[3];    /* N m Q28 per turn/sample^2 Q36: mantissa of demand_shift */
     int32_t drive_of[3];     /* turn/sample^2 Q36 per N m Q28: mantissa of drive_shift */
@@ -149,11 +151,13 @@ typedef struct {
     int32_t response[9];       /* turn/sample^2 Q36 */
     int32_t drive[9];          /* turn/sample^2 Q36 */
     int32_t steps;             /* tick */
+    int32_t gap;               /* tick */
     int32_t restarted;
     int32_t arithmetic;
+    int32_t reserved;          /* zero */
 } appc_state;
 
-/* the law appc, controllers/appc.py */
+/* the law appc, controllers/appc_observer.py */
 typedef struct appc {
     appc_par par;
     appc_state state;
@@ -233,7 +237,7 @@ typedef struct state_space {
 _Static_assert(sizeof(reference) == 184, "padding in reference");
 _Static_assert(sizeof(pd) == 128, "padding in pd");
 _Static_assert(sizeof(mrac) == 672, "padding in mrac");
-_Static_assert(sizeof(appc) == 352, "padding in appc");
+_Static_assert(sizeof(appc) == 368, "padding in appc");
 _Static_assert(sizeof(fvsc) == 440, "padding in fvsc");
 _Static_assert(sizeof(state_space) == 776, "padding in state_space");
 

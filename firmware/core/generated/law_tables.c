@@ -85,6 +85,7 @@ static const word_range APPC_RANGES[APPC_WORDS] = {
     {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_y */
     {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_z */
     {-274, 1924145623, NO_WORD}, /* orbit_rate_radps */
+    {0, 1, NO_WORD}, /* recover_torque */
 };
 
 static const word_range FVSC_RANGES[FVSC_WORDS] = {
@@ -359,7 +360,7 @@ static const word_range STATE_SPACE_RANGES[STATE_SPACE_WORDS] = {
 const law_table LAW_TABLES[LAW_TABLES_COUNT] = {
     {1, 2, 0x72A0703C, PD_RANGES, 1000, 10000000, {{0x1F, 0x06, 1}, {0x1F, 0x06, 5}}, PD_WORDS, 8, NO_WORD, NO_WORD}, /* pd */
     {2, 1, 0x5C9EFFBA, MRAC_RANGES, 200000, 1000000, {{0x03, 0x02, 1}, {0x02, 0x04, 1}}, MRAC_WORDS, 0, 4, 32}, /* mrac */
-    {3, 1, 0x2A4D5A9F, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
+    {3, 2, 0xD87A6746, APPC_RANGES, 200000, 1000000, {{0x02, 0x04, 1}}, APPC_WORDS, NO_WORD, NO_WORD, 0}, /* appc */
     {4, 1, 0x3691E8F1, FVSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, FVSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* fvsc */
     {5, 1, 0x6AA34574, VSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, VSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* vsc */
     {6, 1, 0x3B3D5554, IFVSC_RANGES, 1000, 10000000, {{0x1F, 0x06, 5}}, IFVSC_WORDS, NO_WORD, NO_WORD, NO_WORD}, /* ifvsc */

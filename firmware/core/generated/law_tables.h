@@ -8,7 +8,7 @@
 /* The built-in laws. */
 enum { PD_LAW_ID = 1, PD_LAW_VERSION = 2 };
 enum { MRAC_LAW_ID = 2, MRAC_LAW_VERSION = 1 };
-enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 1 };
+enum { APPC_LAW_ID = 3, APPC_LAW_VERSION = 2 };
 enum { FVSC_LAW_ID = 4, FVSC_LAW_VERSION = 1 };
 enum { VSC_LAW_ID = 5, VSC_LAW_VERSION = 1 };
 enum { IFVSC_LAW_ID = 6, IFVSC_LAW_VERSION = 1 };
@@ -92,7 +92,8 @@ enum {
     APPC_INERTIA_KGM2_Y = 5,      /* 2^-26 kg m^2: principal inertia the law believes in, y */
     APPC_INERTIA_KGM2_Z = 6,      /* 2^-26 kg m^2: principal inertia the law believes in, z */
     APPC_ORBIT_RATE_RADPS = 7,    /* 2^-38 rad/s: orbital rate w0, used with gyro */
-    APPC_WORDS = 8
+    APPC_RECOVER_TORQUE = 8,      /* after lost SAMPLEs, take from the wheels' momentum what torque acted */
+    APPC_WORDS = 9
 };
 
 /* CONFIG words of fvsc, from the law's first. */
@@ -504,6 +505,7 @@ enum { MRAC_DECOUPLE_OFF = 0, MRAC_DECOUPLE_ON = 1 };
 enum { MRAC_IDENTIFY_OFF = 0, MRAC_IDENTIFY_ON = 1 };
 enum { APPC_ADAPT_OFF = 0, APPC_ADAPT_ON = 1 };
 enum { APPC_GYRO_OFF = 0, APPC_GYRO_ON = 1 };
+enum { APPC_RECOVER_TORQUE_OFF = 0, APPC_RECOVER_TORQUE_ON = 1 };
 enum { FVSC_ERROR_EULER = 0, FVSC_ERROR_QUATERNION = 1 };
 enum { FVSC_RATE_IN_S_SENSED = 0, FVSC_RATE_IN_S_DIFFERENCE = 1 };
 enum { FVSC_INFERENCE_CLOSED = 0, FVSC_INFERENCE_TABLE = 1 };

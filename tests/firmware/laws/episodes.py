@@ -164,6 +164,7 @@ def _appc(rng: np.random.Generator) -> dict[str, Any]:
         "observer_pole": float(rng.uniform(0.3, 0.97)),
         "adapt": int(rng.random() < 0.8),
         "gyro": int(rng.random() < 0.5),
+        "recover_torque": int(rng.random() < 0.8),
         "inertia_kgm2": _inertia(rng),
         "orbit_rate_radps": float(rng.choice([1.0830778e-3, rng.uniform(0, 0.007)])),
     }
