@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import selectors
 import signal
 import subprocess
@@ -23,9 +24,10 @@ from sil.launched import child_environment
 from sil.trouble import LinkFailure
 
 STOP_S = 5.0
-QUIET_S = 30.0  # a law that compiles and a long log that is sealed are silent, too
+QUIET_S = 30.0  # a law that compiles is silent, too
+SEAL_S = 1e-3  # more for each tick of a log that is sealed and read; a tenth of it is usual
 GIVE_UP_S = 300.0  # as long as a board may take to be ready; nothing else takes so long
-READY, ALIVE = b'{"ready": true}', b'{"alive": true}'
+READY, ALIVE, SEALING = b'{"ready": true}', b'{"alive": true}', re.compile(rb'{"sealing": ([0-9]{1,12})}')
 Order = dict[str, Any]  # point, sets, folder, keep
 
 
@@ -46,6 +48,7 @@ class Worker:
         self.nonsense = ""
         self.heard_s = time.monotonic()  # when it last said something, or was given a point
         self.told = False  # that it is quiet
+        self.granted_s = 0.0  # to be quiet for longer, while it seals
         self._rest = b""
         self._send(setup)
 
@@ -57,7 +60,7 @@ class Worker:
     def fly(self, order: Order) -> None:
         """Give it a point."""
         self.order = order
-        self.heard_s, self.told = time.monotonic(), False
+        self.heard_s, self.told, self.granted_s = time.monotonic(), False, 0.0
         self._send(order)
 
     def records(self) -> list[Record] | None:
@@ -71,6 +74,9 @@ class Worker:
                 self.ready = True
                 continue
             if line == ALIVE:
+                continue
+            if sealing := SEALING.fullmatch(line):
+                self.granted_s = SEAL_S * int(sealing[1])
                 continue
             try:
                 record = Record.read(line)
@@ -170,19 +176,20 @@ class Pool:
     def _look_after(self, worker: Worker) -> Iterator[Record]:
         """A worker that is at a point: is it quiet for too long?"""
         silent_s = time.monotonic() - worker.heard_s
-        if silent_s < QUIET_S:
+        if silent_s < QUIET_S + worker.granted_s:
             return
         assert worker.order is not None
         stopped = worker.is_stopped()
         pid = worker.process.pid
-        if silent_s >= GIVE_UP_S:
+        give_up_s = GIVE_UP_S + worker.granted_s
+        if silent_s >= give_up_s:
             why = "stood still, stopped by a signal" if stopped else "hung: no tick went by"
             worker.process.kill()
-            yield from self._gone(worker, f"the worker process was killed after {GIVE_UP_S:g} s in which it {why}")
+            yield from self._gone(worker, f"the worker process was killed after {give_up_s:g} s in which it {why}")
         elif not worker.told:
             worker.told = True
             why = f"it is stopped (kill -CONT {pid} lets it go on)" if stopped else "no tick goes by"
-            left = f"given up after {GIVE_UP_S:g} s"
+            left = f"given up after {give_up_s:g} s"
             self._tell(f"point {worker.order['point']}: nothing from worker {pid} for {silent_s:.0f} s: {why}; {left}")
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
 """A worker process of a sweep: `python -m sil.campaign.worker`. Orders come in as lines of JSON, records go out.
 
 First line in: {"scenario", "directory"}; then one {"point", "sets", "folder", "keep"} for each point. First line out:
-{"ready": true}; then a record for each, and before it {"alive": true} about once a second while ticks go by. It ends
-when nothing more comes in, and it dies with its parent.
+{"ready": true}; then a record for each, and before it {"alive": true} about once a second while ticks go by, and
+{"sealing": TICKS} when they are over. It ends when nothing more comes in, and it dies with its parent.
 """
 
 from __future__ import annotations
@@ -53,17 +53,19 @@ class Alive(Watch):
 
     def __init__(self, out: TextIO) -> None:
         self._out, self._said_s = out, time.monotonic()
+        self._ticks = 0  # that have gone by
 
     def tick(self, tick: int, ticks: int, motion: Motion) -> None:
+        self._ticks = tick + 1
         if time.monotonic() - self._said_s >= ALIVE_EVERY_S:
-            self._say()
+            self._say({"alive": True})
 
     def stage(self, name: str) -> None:
-        self._say()
+        self._say({"sealing": self._ticks} if name == "seal" else {"alive": True})
 
-    def _say(self) -> None:
+    def _say(self, what: dict[str, Any]) -> None:
         self._said_s = time.monotonic()
-        print(json.dumps({"alive": True}), file=self._out, flush=True)
+        print(json.dumps(what), file=self._out, flush=True)
 
 
 def fly(setup: dict[str, Any], order: dict[str, Any], watch: Watch | None = None) -> Record:
