@@ -60,7 +60,7 @@ def tables(
 
     Each table is a sweep over the variants of a built-in scenario (delay-picosat, delay-nanosat, delay-large;
     delay-comparison with --comparison) and the delay, in process and in lockstep. All of 000 is 32 runs of 150,000 to
-    300,000 ticks: half an hour on one CPU. Its comparison takes two minutes.
+    300,000 ticks: half an hour on one CPU, half of that on two. Its comparison takes two minutes.
 
     A row is reproduced if each axis is within 25 % (5 % and 0.02 s in the comparison), lost as printed if both turn
     beyond 30 deg. Writes the directories of the sweeps, and the rows.
