@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN     = $(VENV)/bin
 JOBS   ?= 2
 
-.PHONY: check lint types imports test golden firmware bench fuzz soak clean
+.PHONY: check lint types imports test docs golden firmware bench fuzz soak clean
 
 check: lint types imports test
 
@@ -31,6 +31,10 @@ imports: $(VENV)/.installed
 
 test: $(VENV)/.installed tests/e2e/node_modules/.installed
 	$(BIN)/python -m pytest -n $(JOBS) --durations=10
+
+# The site, in build/docs: open build/docs/index.html
+docs: $(VENV)/.installed
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet docs build/docs
 
 golden: $(VENV)/.installed
 	$(BIN)/python -m tools.make_vectors

@@ -1,0 +1,88 @@
+"""The site: how Sphinx and MyST make build/docs of docs/; `make docs` runs it, without any network.
+
+Links are the files' own, so that they lead to the same place here and where a git host shows the files. Two pages are
+files that stand elsewhere in the repository (PAGES_FROM); links to those files lead to these pages.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING
+
+from pygments.lexers.special import TextLexer
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+
+DOCS = Path(__file__).resolve().parent
+REPO = DOCS.parent
+sys.path.insert(0, str(REPO))  # autodoc reads the product that stands here
+PAGES_FROM = {"reference/wire": "protocol/SPEC.md", "changelog": "CHANGELOG.md"}
+LINKS_TO = {source: f"{page}.md" for page, source in PAGES_FROM.items()} | {"README.md": "index.md"}
+PLAIN = ("crc", "frame", "law", "layout", "packet", "stream")  # names that SPEC.md gives its blocks
+LINK = re.compile(r"(?<=\]\()([^)\s#]+)(?=[)#])")
+
+project = "attitude-sil"
+author = "The attitude-sil engineers"
+release = version_of("attitude-sil")
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
+exclude_patterns = ["examples", "pictures", "_*"]
+nitpicky = True
+nitpick_ignore_regex = [(r"py:.*", r"(?!(sil|protocol|firmware_sim)\b).*")]  # no inventories of others: no network
+
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+myst_links_external_new_tab = False
+copybutton_prompt_text = r"\$ "
+copybutton_prompt_is_regexp = True
+
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+autodoc_use_type_comments = False
+python_maximum_signature_line_length = 90
+
+html_theme = "furo"
+html_title = "attitude-sil"
+html_logo = html_favicon = "_static/logo.svg"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = html_show_copyright = False
+html_use_index = True
+pygments_style, pygments_dark_style = "tango", "github-dark"
+html_theme_options = {
+    "top_of_page_buttons": [],
+    "light_css_variables": {"color-brand-primary": "#0072B2", "color-brand-content": "#0072B2"},
+    "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#56B4E9"},
+}
+
+
+def of_elsewhere(app: Sphinx, page: str, text: list[str]) -> None:
+    """The text of a page that stands elsewhere, and links that lead to its page."""
+    here = DOCS / f"{page}.md"
+    if page in PAGES_FROM:
+        here = REPO / PAGES_FROM[page]
+        app.env.note_dependency(str(here), docname=page)
+        text[0] = here.read_text(encoding="utf-8")
+    text[0] = LINK.sub(lambda found: _relinked(found[1], here, page), text[0])
+
+
+def _relinked(target: str, here: Path, page: str) -> str:
+    """A link of the file `here`, as it has to be on `page`; addresses, and what is no file, are left as they are."""
+    if "://" in target or not (file := Path(os.path.normpath(here.parent / target))).exists():
+        return target
+    known = LINKS_TO.get(file.relative_to(REPO).as_posix()) if file.is_relative_to(REPO) else None
+    found = DOCS / known if known else file
+    return PurePosixPath(os.path.relpath(found, (DOCS / page).parent)).as_posix()
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Sphinx calls this once."""
+    for name in PLAIN:
+        app.add_lexer(name, TextLexer)
+    app.connect("source-read", of_elsewhere)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
