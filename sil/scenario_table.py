@@ -1,6 +1,6 @@
-"""The built-in scenarios as one Markdown table of every value that is not the default: docs/SCENARIOS.md.
+"""The built-in scenarios as one Markdown table of every value that is not the default: docs/reference/scenarios.md.
 
-python -m sil.scenario_table > docs/SCENARIOS.md
+python -m sil.scenario_table > docs/reference/scenarios.md
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ def non_defaults(scenario: Scenario) -> dict[str, Any]:
 
 
 def markdown() -> str:
-    """The whole of docs/SCENARIOS.md."""
+    """The whole of docs/reference/scenarios.md."""
     infos = list_scenarios()
     about = "".join(f"- `{info.name}`: {info.about}.\n" for info in infos)
     rows = "".join(row for info in infos for row in _rows(load_scenario(info.name)))

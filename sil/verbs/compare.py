@@ -48,8 +48,8 @@ def compare(
     """Compare runs or scenarios in one table: error, settling, effort, missed commands, verdict.
 
     A scenario is run first, in process and lockstep; its log goes to a temporary directory unless --keep says where.
-    --set is for the scenarios only. What the columns mean: docs/GUIDE.md, metrics. A run that failed its requirements
-    is a row like any other.
+    --set is for the scenarios only. What the columns mean: docs/concepts/verdicts-and-metrics.md. A run that failed
+    its requirements is a row like any other.
 
     Exit codes: 0 table printed, 2 usage, 3 a scenario could not be run to its end, 130 interrupted; the runs that were
     complete by then are in the table.

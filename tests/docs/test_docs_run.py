@@ -1,15 +1,25 @@
 """What the documents show is true: their commands run, their files and verbs and scenarios exist, their output is real.
 
-Blocks are named in the line that opens them. On the PAGES, each run in a directory of its own: `sh test` runs line by
-line, `text printed` is what the last of them printed, `yaml FILE` and `python FILE` are files, `sh not-run` gives its
-reason. In the guide also: `sh same` runs and prints what stands below each command, `sh terminal-1` and `-2` run side
-by side, `sh example` flies the example law.
+Every page of docs/ that shows a command is followed, in a directory of its own in which the quick start has been
+followed before: `runs/mrac-rs232-001` is there. Blocks are named in the line that opens them:
+
+    sh test         runs line by line; `# exit 1` says which exit code to expect, without it 0
+    sh same         runs, and each command prints the line below it
+    sh not-run      says why not, in its first line
+    sh terminal-1   and -2 run side by side
+    text printed    is what the command before it printed, but for times and what depends on the machine
+    yaml FILE       is that file
+    python FILE     is that file; runs, unless it defines a class
+    python cell     is a cell of a notebook: all of a page run in order, in one process, at the end
+
+Pages that a program makes say so in a line `Made by ...`; their commands are not run.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shutil
 import socket
 import subprocess
 import sys
@@ -24,13 +34,12 @@ from sil.scenario import load_scenario
 from sil.scenarios import list_scenarios
 
 REPO = Path(__file__).resolve().parents[2]
-DOCUMENTS = [REPO / "README.md", REPO / "CHANGELOG.md", *sorted((REPO / "docs").glob("*.md"))]
-# What a user follows:
-PAGES = [f"docs/{name}.md" for name in ("GUIDE", "REALTIME", "STUDIES", "CI", "BOARD", "FAULTS", "LINK")]
+DOCS = sorted(str(path.relative_to(REPO)) for path in (REPO / "docs").rglob("*.md"))
+DOCUMENTS = ["README.md", "CHANGELOG.md", *DOCS]
 FENCE = re.compile(r"^```(\S+)(?: (\S+))?\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 EXIT = re.compile(r"\s+# exit (\d+)$")
 NAMES = {  # of the fenced blocks a page may have
-    "sh": {"test", "same", "example", "terminal-1", "terminal-2", "not-run"},
+    "sh": {"test", "same", "terminal-1", "terminal-2", "not-run"},
     "text": {"", "printed"},
 }
 WAITING = (["the", "board", "is"], ["still", "waiting", "for"])  # for READY
@@ -50,11 +59,6 @@ class Block(NamedTuple):
         return [(EXIT.sub("", line), int(found[1]) if (found := EXIT.search(line)) else 0) for line in lines]
 
 
-def held_up(printed: str) -> bool:
-    """A paced run passed, or says that this machine was too busy for its clock."""
-    return bool(re.search("^(passed|degraded)|not reproducible", printed, re.MULTILINE))
-
-
 def blocks(document: str) -> list[Block]:
     return [Block(*(part or "" for part in found)) for found in FENCE.findall((REPO / document).read_text())]
 
@@ -64,10 +68,25 @@ def named(document: str, language: str, name: str) -> Block:
     return found
 
 
+def is_made(document: str) -> bool:
+    """By a program, whose own test says that it is current."""
+    return bool(re.search(r"^Made by ", (REPO / document).read_text(), re.MULTILINE))
+
+
+WRITTEN = [page for page in DOCS if not is_made(page)]
+PAGES = [page for page in WRITTEN if any(block.name in ("test", "same", "cell") for block in blocks(page))]
+
+
+def held_up(printed: str) -> bool:
+    """A paced run passed, or says that this machine was too busy for its clock."""
+    return bool(re.search("^(passed|degraded)|not reproducible", printed, re.MULTILINE))
+
+
 def environment() -> dict[str, str]:
     """`sil` and `python` are this interpreter's; colours and widths do not depend on who runs the test."""
     here = str(Path(sys.executable).parent)
-    return {**os.environ, "PATH": f"{here}{os.pathsep}{os.environ['PATH']}", "COLUMNS": "100", "PYTHONSAFEPATH": "1"}
+    set_here = {"COLUMNS": "100", "PYTHONSAFEPATH": "1", "MPLBACKEND": "Agg"}
+    return {**os.environ, "PATH": f"{here}{os.pathsep}{os.environ['PATH']}", **set_here}
 
 
 def shell(command: str, folder: Path, code: int | None = 0) -> str:
@@ -91,7 +110,7 @@ def shell(command: str, folder: Path, code: int | None = 0) -> str:
 def files_of(document: str, folder: Path) -> Path:
     """The folder, with every file in it that the page shows."""
     for block in blocks(document):
-        if block.language in ("yaml", "python"):
+        if block.language in ("yaml", "python") and block.name != "cell":
             (folder / block.name).write_text(block.text)
     return folder
 
@@ -99,26 +118,51 @@ def files_of(document: str, folder: Path) -> Path:
 # -- the pages -----------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture(scope="session")
+def first_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run that the quick start leaves."""
+    folder = tmp_path_factory.mktemp("first")
+    shell("sil run mrac-rs232", folder)
+    return folder / "runs"
+
+
 @pytest.mark.parametrize("page", PAGES)
-def test_the_pages_commands_run_exit_and_print_as_they_say(page: str, tmp_path: Path) -> None:
+def test_the_pages_commands_run_exit_and_print_as_they_say(page: str, tmp_path: Path, first_run: Path) -> None:
+    if page != "docs/quick-start.md":
+        shutil.copytree(first_run, tmp_path / "runs")
     files_of(page, tmp_path)
-    printed, count = "", 0
+    printed = ""
     for block in blocks(page):
         if (block.language, block.name) == ("sh", "test"):
             for command, code in block.commands():
-                paced = any(clock in command for clock in PACED)  # a busy machine may degrade it: not the page's fault
-                printed = shell(command, tmp_path, None if paced else code)
-                assert not paced or held_up(printed), printed
-                count += 1
-        elif block.language == "python" and "class " not in block.text:
-            shell(f"python {block.name}", tmp_path)
+                printed = follow(command, code, tmp_path)
+        elif (block.language, block.name) == ("sh", "same"):
+            for (command, code), (said, _) in zip(*[iter(block.commands())] * 2, strict=True):
+                assert shell(command, tmp_path, code).strip() == said
+        elif block.language == "python" and block.name != "cell" and "class " not in block.text:
+            printed = shell(f"python {block.name}", tmp_path)
         elif (block.language, block.name) == ("text", "printed"):
             lines = iter(lasting(printed))  # progress, on stderr, may stand between those shown
             assert [shown for shown in lasting(block.text) if shown not in lines] == [], printed
-    assert count >= 5
+    if cells := [block.text for block in blocks(page) if block.name == "cell"]:
+        (tmp_path / "cells.py").write_text("\n".join(cells))
+        shell("python cells.py", tmp_path)
 
 
-@pytest.mark.parametrize("page", PAGES)
+def follow(command: str, code: int, folder: Path) -> str:
+    """A busy machine may degrade a paced run: not the page's fault."""
+    paced = any(clock in command for clock in PACED)
+    printed = shell(command, folder, None if paced else code)
+    assert not paced or held_up(printed), printed
+    return printed
+
+
+def test_pages_are_found() -> None:
+    assert {"docs/quick-start.md", "docs/how-to/own-law.md", "docs/concepts/determinism.md"} <= set(PAGES)
+    assert len(PAGES) >= 15
+
+
+@pytest.mark.parametrize("page", WRITTEN)
 def test_every_block_of_a_page_is_run_or_says_why_not(page: str) -> None:
     for block in blocks(page):
         assert block.name in NAMES.get(block.language, {block.name or "no name"}), block
@@ -126,33 +170,23 @@ def test_every_block_of_a_page_is_run_or_says_why_not(page: str) -> None:
             assert re.match(r"# not run in the test: \S+", block.text), block
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
-def test_links_lead_to_headings(document: Path) -> None:
-    """`GUIDE.md#metrics` and `#metrics` name a heading as web pages of the repository spell it."""
-    for target in re.findall(r"\]\(([^)\s]*#[^)\s]+)\)", document.read_text()):
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_lead_to_headings(document: str) -> None:
+    """`ci.md#json` and `#json` name a heading as web pages of the repository spell it."""
+    path = REPO / document
+    for target in re.findall(r"\]\(([^)\s]*#[^)\s]+)\)", path.read_text()):
         name, _, anchor = target.partition("#")
-        page = document.parent / name if name else document
+        page = path.parent / name if name else path
         headings = re.findall(r"^#+ (.*)$", re.sub(FENCE, "", page.read_text()), re.MULTILINE)
         assert anchor in {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}, target
-
-
-@pytest.fixture(scope="module")
-def guide(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return files_of("docs/GUIDE.md", tmp_path_factory.mktemp("guide"))
-
-
-def test_the_guides_error_lines_are_the_programs(tmp_path: Path) -> None:
-    lines = iter(named("docs/GUIDE.md", "sh", "same").text.splitlines())
-    for line in lines:
-        printed = shell(EXIT.sub("", line), tmp_path, int(EXIT.search(line)[1]))  # type: ignore[index]
-        assert printed.strip() == next(lines)
 
 
 def test_two_terminals(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = str(free.getsockname()[1])
-    one, two = (named("docs/GUIDE.md", "sh", f"terminal-{n}").text.strip().replace("5005", port) for n in (1, 2))
+    page = "docs/how-to/two-machines.md"
+    one, two = (named(page, "sh", f"terminal-{n}").text.strip().replace("5005", port) for n in (1, 2))
     board, plant = one, two.replace("scaled:20", "lockstep")
     with subprocess.Popen(board.split(), cwd=tmp_path, env=environment(), stdout=subprocess.PIPE, text=True) as serving:
         try:
@@ -162,38 +196,25 @@ def test_two_terminals(tmp_path: Path) -> None:
             serving.terminate()
 
 
-def test_scenarios_shown_are_valid_and_the_defaults_said_are_the_defaults(guide: Path) -> None:
-    shown, default = load_scenario(guide / "keys.yaml").resolved(), load_scenario(guide / "empty.yaml").resolved()
+def test_scenarios_shown_are_valid_and_the_defaults_said_are_the_defaults(tmp_path: Path) -> None:
+    files_of("docs/how-to/write-a-scenario.md", tmp_path)
+    (tmp_path / "empty.yaml").write_text("{}\n")
+    shown, default = (load_scenario(tmp_path / name).resolved() for name in ("keys.yaml", "empty.yaml"))
     remarked = {"name", "link", "law", "guidance", "require"}
     assert {key for key in shown if shown[key] != default[key]} <= remarked
     assert shown["guidance"]["reference"] == default["guidance"]["reference"]
     assert shown["guidance"]["wn_radps"] == default["guidance"]["wn_radps"]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _empty(guide: Path) -> None:
-    (guide / "empty.yaml").write_text("{}\n")
+# -- a stranger's law (row 11 of issue 1's table) ------------------------------------------------------------------
 
 
-# -- a stranger's law (row 11 of the issue's table) ----------------------------------------------------------------
-
-
-def test_a_strangers_law_of_25_lines_runs_replays_and_plots(tmp_path: Path) -> None:
-    for name in ("my_pd.py", "my-pd.yaml"):
-        (tmp_path / name).write_text((REPO / "docs" / "examples" / name).read_text())
-    assert len((tmp_path / "my_pd.py").read_text().splitlines()) <= 25
-    check, run, replay, plot = (command for command, _ in named("docs/GUIDE.md", "sh", "example").commands())
-    assert "valid" in shell(check, tmp_path)
-    assert shell(run, tmp_path).startswith("passed")
-    assert shell(replay, tmp_path).startswith("identical: 1200 ticks")
-    assert shell(plot, tmp_path).strip() == "runs/my-pd-001/plot.png"
-    picture = (tmp_path / "runs/my-pd-001/plot.png").read_bytes()
-    assert picture.startswith(b"\x89PNG") and len(picture) > 20_000
-
-
-def test_the_guide_shows_the_examples_as_they_are() -> None:
+def test_the_examples_are_shown_as_they_are_and_a_strangers_law_has_25_lines() -> None:
+    """That they run, replay and plot is their page's test."""
     for language, name in (("python", "my_pd.py"), ("yaml", "my-pd.yaml")):
-        assert named("docs/GUIDE.md", language, name).text == (REPO / "docs" / "examples" / name).read_text()
+        text = (REPO / "docs" / "examples" / name).read_text()
+        assert named("docs/how-to/own-law.md", language, name).text == text
+        assert name != "my_pd.py" or len(text.splitlines()) <= 25
 
 
 # -- the README ----------------------------------------------------------------------------------------------------
@@ -254,18 +275,18 @@ def test_the_readmes_tree_names_what_exists() -> None:
     assert packages <= set(tree)
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
-def test_links_and_file_names_exist(document: Path) -> None:
-    text = document.read_text()
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_links_and_file_names_exist(document: str) -> None:
+    text, folder = (REPO / document).read_text(), (REPO / document).parent
     targets = [target.partition("#")[0] for target in re.findall(r"\]\(([^)\s]+)\)", text) if "://" not in target]
-    assert [target for target in targets if target and not (document.parent / target).exists()] == []
+    assert [target for target in targets if target and not (folder / target).exists()] == []
     files = re.findall(r"`((?:sil|protocol|firmware_sim|tests|tools|docs)/[\w./-]+)`", text)
     assert [file for file in files if "NAME" not in file and not (REPO / file).exists()] == []
 
 
-@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
-def test_verbs_and_scenarios_exist(document: Path) -> None:
-    text = document.read_text()
+@pytest.mark.parametrize("document", DOCUMENTS)
+def test_verbs_and_scenarios_exist(document: str) -> None:
+    text = (REPO / document).read_text()
     verbs = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
     said = set(re.findall(r"(?:^|`)sil ([a-z][a-z-]*)", text, re.MULTILINE))
     assert said <= verbs
@@ -275,7 +296,7 @@ def test_verbs_and_scenarios_exist(document: Path) -> None:
 
 
 def test_every_verb_stands_in_the_readme_and_every_scenario_in_its_table() -> None:
-    readme, table = (REPO / "README.md").read_text(), (REPO / "docs/SCENARIOS.md").read_text()
+    readme, table = (REPO / "README.md").read_text(), (REPO / "docs/reference/scenarios.md").read_text()
     verbs = typer.main.get_command(app).commands  # type: ignore[attr-defined]
     assert [verb for verb in verbs if f"`{verb}`" not in readme] == []
     assert [entry.name for entry in list_scenarios() if f"`{entry.name}`" not in table] == []

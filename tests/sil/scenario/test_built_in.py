@@ -168,8 +168,8 @@ def test_every_profile_gives_ascending_rows_within_the_run(profile: str) -> None
 
 
 def test_the_table_in_the_docs_is_current() -> None:
-    """Make it again with: python -m sil.scenario_table > docs/SCENARIOS.md"""
-    assert (Path(__file__).parents[3] / "docs" / "SCENARIOS.md").read_text(encoding="utf-8") == markdown()
+    """Make it again with: python -m sil.scenario_table > docs/reference/scenarios.md"""
+    assert (Path(__file__).parents[3] / "docs" / "reference" / "scenarios.md").read_text(encoding="utf-8") == markdown()
 
 
 @pytest.mark.parametrize("name", NAMES)
