@@ -13,12 +13,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Browser, program
 
 from sil import open_run
 from sil.report.page import report
 from sil.runner import run_scenario
 from sil.scenario import load_scenario
+from tools.browser import Browser, program
 
 DESKTOP, PHONE = (1400, 900), (390, 844)
 READY_MS = 1000.0  # what the page may take until it can be used, by the browser's own clock
