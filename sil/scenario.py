@@ -2,13 +2,13 @@
 
 `load_scenario("mrac-rs232", ["duration_s=60"])` reads a built-in or a file, applies `extends` and the overrides, and
 raises ScenarioInvalid with one line per problem. The sections and their defaults are in scenario_sections.py, those of
-sensors and wheels in scenario_instruments.py, the timeline in scenario_events.py.
+sensors and wheels in scenario_instruments.py, the timeline in scenario_events.py; how keys have to fit each other in
+scenario_cross.py.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal
 
@@ -16,16 +16,12 @@ from pydantic import Field, PrivateAttr, ValidationError
 
 from protocol.law_tables import INT32_MAX, LawTable, Variant, variant_of
 from sil import scenario_law as laws
-from sil.plants import PLANTS
-from sil.profiles import PROFILES, SetpointRow, setpoints
-from sil.scenario_errors import Path, Problem, ScenarioInvalid, Where, key_of, one_of, shown
+from sil.profiles import SetpointRow, setpoints
+from sil.scenario_cross import cross_problems, problem
+from sil.scenario_errors import Problem, ScenarioInvalid, Where
 from sil.scenario_events import Event
-from sil.scenario_events import findings as event_findings
-from sil.scenario_faults import findings as fault_findings
 from sil.scenario_instruments import Actuators, Sensors
-from sil.scenario_link import Link, faults_problems
-from sil.scenario_metrics import refused_metric
-from sil.scenario_sampling import findings as sampling_findings
+from sil.scenario_link import Link
 from sil.scenario_sections import (
     Attitude,
     Board,
@@ -43,14 +39,10 @@ from sil.scenario_sections import (
 from sil.scenario_source import Source, from_values, read_scenario
 from sil.scenario_validation import problems_of, unknown_keys
 from sil.scenarios import is_file
-from sil.sensors import SENSORS
 from sil.timeline import setpoint_rows
-from sil.user_plant import is_user_plant
-from sil.user_plant import refused as refused_plant
 
 # How it is run, not what is run.
 NOT_IDENTITY = ("clock", "timing", "link", "board", "restart_limit", "out", "variants")
-MOST_TICKS = 0xFFFFFFFE  # the last tick number that a header can carry
 
 
 class Scenario(Section):
@@ -230,7 +222,7 @@ def _build(source: Source, user_table: laws.UserTable) -> Scenario:
     except ValidationError as error:
         raise ScenarioInvalid(_sorted([*found, *problems_of(error, source.where_of)])) from None
     scenario._source = source
-    found += [*_law_problems(scenario, source, user_table), *_cross_problems(scenario)]
+    found += [*_law_problems(scenario, source, user_table), *cross_problems(scenario)]
     if found:
         raise ScenarioInvalid(_sorted(found))
     table = scenario._table
@@ -246,7 +238,7 @@ def _sorted(problems: Sequence[Problem]) -> list[Problem]:
     return sorted(problems, key=lambda problem: (problem.where.partition(":")[0], problem.line))
 
 
-# -- what one key alone cannot tell -----------------------------------------------------------------------------------
+# -- the law ----------------------------------------------------------------------------------------------------------
 
 
 def _law_problems(scenario: Scenario, source: Source, user_table: laws.UserTable) -> Iterator[Problem]:
@@ -260,9 +252,9 @@ def _law_problems(scenario: Scenario, source: Source, user_table: laws.UserTable
         scenario._table = table
         yield from laws.problems(table, scenario.law.params, source.where_of)
     elif table.startswith("law.version "):
-        yield _problem(scenario, "law.version", table.removeprefix("law.version "), scenario.law.version)
+        yield problem(scenario, "law.version", table.removeprefix("law.version "), scenario.law.version)
     else:
-        yield _problem(scenario, "law.name", table, scenario.law.name)
+        yield problem(scenario, "law.name", table, scenario.law.name)
 
 
 def _user_table(scenario: Scenario, user_table: laws.UserTable) -> LawTable | str:
@@ -275,147 +267,3 @@ def _user_table(scenario: Scenario, user_table: laws.UserTable) -> LawTable | st
     except (ValueError, TypeError, OSError, SyntaxError, OverflowError, RecursionError, MemoryError) as error:
         reason = " ".join(str(error).split())
         return f"class {class_name} with PARAMS = {{name: (default, unit, lsb)}} ({reason})"
-
-
-def _cross_problems(scenario: Scenario) -> Iterator[Problem]:
-    checks: tuple[Callable[[Scenario], Iterator[Problem]], ...] = (
-        _times,
-        _names,
-        _steps,
-        _requirements,
-        _inertia,
-        _torque_scale,
-        _misalignment,
-        _sampling,
-        _files,
-        _events,
-        _link_faults,
-    )
-    yield from dict.fromkeys(problem for check in checks for problem in check(scenario))  # each of them once
-
-
-def _times(scenario: Scenario) -> Iterator[Problem]:
-    period, duration = scenario.period_s, scenario.duration_s
-    if abs(period * 1e6 - scenario.period_us) > 1e-6 * max(1.0, period):
-        nearest = f"a whole number of microseconds, nearest {scenario.period_us * 1e-6:.6f} s"
-        yield _problem(scenario, "period_s", nearest, period)
-        return
-    ticks = max(1, round(duration * 1e6 / scenario.period_us))
-    if abs(duration * 1e6 - ticks * scenario.period_us) > 0.5:
-        nearest = f"a whole number of periods of {period:g} s, nearest {ticks * scenario.period_us / 1e6:g} s"
-        yield _problem(scenario, "duration_s", nearest, duration)
-    elif ticks > MOST_TICKS:
-        yield _problem(scenario, "duration_s", f"at most {MOST_TICKS} ticks", duration)
-    elif scenario.metrics.from_tick >= ticks:
-        yield _problem(scenario, "metrics.from_tick", f"a tick below {ticks}, the end", scenario.metrics.from_tick)
-
-
-def _names(scenario: Scenario) -> Iterator[Problem]:
-    kind, profile, file = scenario.plant.kind, scenario.guidance.profile, scenario.file_of("plant.kind")
-    if profile not in PROFILES:
-        yield _problem(scenario, "guidance.profile", one_of(PROFILES, profile), profile)
-    if file is None or not is_user_plant(kind):
-        expected = None if kind in PLANTS else f"{one_of(PLANTS, kind)}, or ./FILE.py:CLASS"
-    else:
-        expected = refused_plant(file, kind)
-    if expected is not None:
-        yield _problem(scenario, "plant.kind", expected, kind)
-
-
-def _steps(scenario: Scenario) -> Iterator[Problem]:
-    rows = scenario.guidance.rows
-    if rows and scenario.guidance.profile != "steps":
-        yield _problem(scenario, "guidance.rows", "rows with profile steps only", scenario.guidance.profile)
-    if not rows and scenario.guidance.profile == "steps":
-        yield _problem(scenario, "guidance.rows", "at least one {t_s, attitude_deg} for profile steps", ())
-    for index in range(1, len(rows)):
-        if rows[index].t_s <= rows[index - 1].t_s:
-            expected = f"a number in s above {rows[index - 1].t_s:g}, the row before"
-            yield _problem(scenario, ("guidance", "rows", index, "t_s"), expected, rows[index].t_s)
-
-
-def _requirements(scenario: Scenario) -> Iterator[Problem]:
-    for index, line in enumerate(scenario.require):
-        if expected := refused_metric(line.metric):
-            yield _problem(scenario, ("require", index, "metric"), expected, line.metric)
-        said = [name for name in ("below", "above", "between") if getattr(line, name) is not None]
-        if len(said) != 1:
-            got = " and ".join(said) or "none of them"
-            place = scenario._source.where_of(("require", index))
-            key = key_of(("require", index))
-            yield Problem(str(place), key, "exactly one of below, above, between", got, place.line)
-
-
-def _inertia(scenario: Scenario) -> Iterator[Problem]:
-    inertia, wheels = scenario.plant.inertia_kgm2, scenario.actuators.wheels.inertia_kgm2
-    principal = [inertia[i][i] for i in range(3)]
-    for i in range(3):
-        if principal[i] > principal[i - 1] + principal[i - 2] + 1e-12:
-            limit = f"no moment of inertia above the sum of the other two ({principal[i - 1] + principal[i - 2]:g})"
-            yield _problem(scenario, "plant.inertia_kgm2", limit, principal[i])
-        if scenario.plant.inertia_includes_wheels and wheels[i] >= principal[i]:
-            limit = f"less than plant.inertia_kgm2 ({principal[i]:g}), which includes the wheels"
-            yield _problem(scenario, "actuators.wheels.inertia_kgm2", limit, wheels[i])
-
-
-def _torque_scale(scenario: Scenario) -> Iterator[Problem]:
-    limits = [limit for limit in scenario.actuators.chosen.torque_max_Nm if limit is not None]
-    largest = scenario.actuators.largest_on_the_wire or max(limits, default=0.0)
-    if largest * 2**scenario.torque_bits >= INT32_MAX:
-        fits = math.floor(math.log2(INT32_MAX / largest))
-        if scenario.wire.torque_bits is not None:
-            expected = f"at most {fits}, for a limit of {largest:g} N m"
-            yield _problem(scenario, "wire.torque_bits", expected, scenario.torque_bits)
-        else:
-            key = f"actuators.{scenario.actuators.kind}.torque_max_Nm"
-            yield _problem(scenario, key, f"at most {INT32_MAX / 2**8:.0f} N m", largest)
-
-
-def _misalignment(scenario: Scenario) -> Iterator[Problem]:
-    thrusters = scenario.actuators.thrusters
-    if thrusters.misalignment is not None and thrusters.misalignment_percent:
-        expected = "0 beside misalignment, which says all of it"
-        yield _problem(scenario, "actuators.thrusters.misalignment_percent", expected, thrusters.misalignment_percent)
-
-
-def _sampling(scenario: Scenario) -> Iterator[Problem]:
-    sensors = scenario.sensors
-    for name in (name for name in SENSORS if getattr(sensors, name).enabled):
-        own = getattr(sensors, name).sampling
-        for path, expected, got in sampling_findings(name, sensors.sampling, own, scenario.period_us):
-            yield _problem(scenario, path, expected, got)
-
-
-def _files(scenario: Scenario) -> Iterator[Problem]:
-    if scenario.schedule is None:
-        return
-    if scenario.board != "none":
-        yield _problem(scenario, "schedule", "a schedule with board none only", f"board {scenario.board}")
-        return
-    file = scenario.file_of("schedule")
-    if file is None or not is_file(file):
-        yield _problem(scenario, "schedule", "a CSV file that exists", scenario.schedule)
-
-
-def _events(scenario: Scenario) -> Iterator[Problem]:
-    if not scenario.ticks:
-        return
-    period_us, ticks = scenario.period_us, scenario.ticks
-    for path, expected, got in (
-        *event_findings(scenario.events, scenario.board, period_us, ticks),
-        *fault_findings(scenario.sensors, scenario.actuators, period_us, ticks),
-    ):
-        yield _problem(scenario, path, expected, got)
-
-
-def _link_faults(scenario: Scenario) -> Iterator[Problem]:
-    url = scenario.board if "://" in scenario.board else scenario.link.url
-    around = (scenario.board, url, scenario.period_s, scenario.duration_s)
-    for path, expected, got in faults_problems(scenario.link.faults, *around):
-        yield _problem(scenario, ("link", "faults", *path), expected, got)
-
-
-def _problem(scenario: Scenario, key: str | Path, expected: str, got: object) -> Problem:
-    path = tuple(key.split(".")) if isinstance(key, str) else key
-    place = scenario._source.where_of(path)
-    return Problem(str(place), key_of(path), expected, shown(got), place.line)
