@@ -7,9 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-import struct
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,31 +19,18 @@ from protocol.law_tables import COMMON
 from sil import mcap_file
 from sil.reference import Start, model_of, recompute
 from sil.run_columns import AXES, COLUMNS, PARTS, TRIPLES
+from sil.run_file import RunError, check_sections, log_of, parsed, read, readable, rows_of
 from sil.sinks import events as event_texts
 from sil.sinks import layouts
 from sil.sinks.journal import Fate
+
+__all__ = ["Array", "EventRow", "PacketRow", "Run", "RunError", "open_run", "readable", "wrapped_deg"]
 
 Array = npt.NDArray[Any]
 _OPENED = ("/truth", "/command", "/telemetry", "/event", "/session")
 _PACKETS = ("/packet/up", "/packet/down")
 _REFERENCE_RESTART = 7
 _RAD = np.pi / 180.0
-_UNREADABLE = (LookupError, ValueError, TypeError, AttributeError, ArithmeticError, struct.error, RecursionError)
-_SECTIONS = {"metrics": dict, "guidance": dict, "law": dict, "plant": dict, "sensors": dict, "require": list}
-_SHOWN = 200  # characters of what is wrong
-
-
-class RunError(Exception):
-    """The run cannot be read: one line that names the file."""
-
-
-@contextmanager
-def readable(path: Path) -> Iterator[None]:
-    """Content that is whole by its CRCs and still not what this version writes is a RunError, whatever it led to."""
-    try:
-        yield
-    except _UNREADABLE as error:
-        raise RunError(f"{path}: written by another version, or damaged: {repr(error)[:_SHOWN]}") from error
 
 
 class EventRow(NamedTuple):
@@ -87,20 +72,20 @@ class Run:
     def __init__(self, path: Path, content: mcap_file.Content) -> None:
         self.path = path
         self.directory = path.parent
-        self.meta = _parsed(content.metadata["run"])
-        self.end = _parsed(content.metadata.get("end", {"reason": "truncated", "ticks": "0"}))
-        self.config_words = _parsed(content.metadata.get("config", {}))
+        self.meta = parsed(content.metadata["run"])
+        self.end = parsed(content.metadata.get("end", {"reason": "truncated", "ticks": "0"}))
+        self.config_words = parsed(content.metadata.get("config", {}))
         self.scenario: dict[str, Any] = json.loads(content.attachments.get("scenario.json", b"{}"))
-        _check_sections(self.scenario)
+        check_sections(self.scenario)
         self.name = str(self.meta.get("name", path.parent.name))
         self.period_ns = int(self.meta["period_ns"])
         if self.period_ns <= 0:
             raise ValueError(f"period_ns: expected a number above 0, got {self.period_ns}")
         self.period_s = self.period_ns * 1e-9
-        self.truth = _rows(content.messages, "/truth", layouts.TRUTH)
-        self.commands = _rows(content.messages, "/command", layouts.COMMAND)
-        self.sessions = [int(row["tick"]) for row in _rows(content.messages, "/session", layouts.SESSION)]
-        self._events = _rows(content.messages, "/event", layouts.EVENT)
+        self.truth = rows_of(content.messages, "/truth", layouts.TRUTH)
+        self.commands = rows_of(content.messages, "/command", layouts.COMMAND)
+        self.sessions = [int(row["tick"]) for row in rows_of(content.messages, "/session", layouts.SESSION)]
+        self._events = rows_of(content.messages, "/event", layouts.EVENT)
         self._columns = self._from_truth() | self._from_commands()
         self.telemetry, telemetry_units = self._from_telemetry(content)
         self._ahead = {topic: rows for topic, rows in content.messages.items() if topic not in _OPENED}
@@ -222,7 +207,7 @@ class Run:
     def samples(self) -> Array:
         """All SAMPLE rows as a structured array (sil.sinks.layouts.SAMPLE; read when first asked for)."""
         with readable(self.path):
-            return _rows(self._messages(("/sample",)), "/sample", layouts.SAMPLE)
+            return rows_of(self._messages(("/sample",)), "/sample", layouts.SAMPLE)
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -235,7 +220,7 @@ class Run:
 
     def _messages(self, topics: tuple[str, ...]) -> Mapping[str, list[mcap_file.Message]]:
         """What was read ahead when the run was opened, if it has these topics; else the file once more."""
-        return self._ahead if all(topic in self._ahead for topic in topics) else _read(self.path, topics).messages
+        return self._ahead if all(topic in self._ahead for topic in topics) else read(self.path, topics).messages
 
     # -- columns -------------------------------------------------------------------------------------------------
 
@@ -268,7 +253,7 @@ class Run:
         except (KeyError, ValueError) as error:
             raise RunError(f"{self.path}: /telemetry does not say what its words are ({error})") from error
         layout = layouts.telemetry(channel.metadata.get("law", ""), [(name, units[name]) for name in names])
-        rows = _rows(content.messages, "/telemetry", layout)
+        rows = rows_of(content.messages, "/telemetry", layout)
         columns = zip(names, layout.fields, strict=False)
         return {name: self._aligned(rows["tick"], rows[field.name]) for name, field in columns}, units
 
@@ -344,8 +329,8 @@ def open_run(path: str | os.PathLike[str], also: tuple[str, ...] = ()) -> Run:
     """
     file = Path(path)
     if file.is_dir():
-        file = _log_of(file)
-    content = _read(file, (*_OPENED, *also))
+        file = log_of(file)
+    content = read(file, (*_OPENED, *also))
     if "run" not in content.metadata or "/truth" not in content.channels:
         raise RunError(f"{file}: an MCAP log (of {content.library or 'unknown origin'}), but not one of a run")
     with readable(file):
@@ -355,55 +340,6 @@ def open_run(path: str | os.PathLike[str], also: tuple[str, ...] = ()) -> Run:
 def wrapped_deg(angle: Array) -> Array:
     """Modulo 360 deg, in [-180, 180]; unchanged where it is there already."""
     return np.where(np.abs(angle) <= 180.0, angle, angle - 360.0 * np.floor(angle / 360.0 + 0.5))
-
-
-def _log_of(folder: Path) -> Path:
-    log = folder / "run.mcap"
-    if log.exists():
-        return log
-    if (folder / "run.journal").exists():
-        raise RunError(f"{folder}: no run.mcap yet; `sil recover {folder}` makes it from run.journal")
-    raise RunError(f"{folder}: expected a run directory, found neither run.mcap nor run.journal in it")
-
-
-def _read(path: Path, topics: tuple[str, ...]) -> mcap_file.Content:
-    try:
-        return mcap_file.read(path, topics)
-    except OSError as error:
-        raise RunError(f"{path}: {error.strerror or error}") from error
-    except mcap_file.McapError as error:
-        raise RunError(f"{path}: {error}{_remedy(path)}") from error
-
-
-def _remedy(path: Path) -> str:
-    """What to do about a damaged log: its journal may be there still."""
-    has_journal = path.name == "run.mcap" and (path.parent / "run.journal").exists()
-    return f"; `sil recover {path.parent}` makes it anew from run.journal" if has_journal else ""
-
-
-def _check_sections(scenario: Any) -> None:
-    """What a scenario's sections are, so that whoever reads a run may look into them. Raises ValueError."""
-    kinds = {key: scenario.get(key) for key in _SECTIONS} if isinstance(scenario, dict) else {"": scenario}
-    for key, value in kinds.items():
-        if value is not None and not isinstance(value, _SECTIONS.get(key, dict)):
-            raise ValueError(f"scenario.json: {key}: expected {_SECTIONS.get(key, dict).__name__}, got {value!r}")
-
-
-def _rows(messages: Mapping[str, list[mcap_file.Message]], topic: str, layout: layouts.Layout) -> Array:
-    start = len(layouts.CDR_HEADER)
-    data = b"".join([message[1][start:] for message in messages.get(topic, ())])
-    return np.frombuffer(data, layout.dtype)
-
-
-def _parsed(texts: Mapping[str, str]) -> dict[str, Any]:
-    """Metadata values: JSON where they are JSON, else the text itself."""
-    result: dict[str, Any] = {}
-    for key, value in texts.items():
-        try:
-            result[key] = json.loads(value)
-        except ValueError:
-            result[key] = value
-    return result
 
 
 def _continuous(q: Array) -> Array:
