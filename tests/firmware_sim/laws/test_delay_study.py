@@ -1,7 +1,8 @@
 """Study of paper 000, section 3: its reference rows, by the product's law steps, plant and thrusters stepped directly.
 
 A law is stepped every 1 ms, as a continuous one; only the sensor unit holds (0.1 s) and delays. Protects the laws, the
-scenarios' gains and signs, and the conventions of docs/papers/000-late-sensors.md. Tolerances are the study's: stable linear rows 1 %,
+scenarios' gains and signs, and the conventions of docs/papers/000-late-sensors.md.
+Tolerances are the study's: stable linear rows 1 %,
 bounded oscillating ones 2 %, FVSC 3 % and 5 % in effort; a lost row has to be lost, its figures mean nothing. Where the
 FVSC has a late rate in S and an undelayed one for the damping, which no SAMPLE has, its law is stepped twice, once with
 either rate and the other gain at 0, and the thrusters limit the sum.
