@@ -53,6 +53,7 @@ class Scenario(Section):
     about: str = ""
     """One line for `sil scenarios`."""
     seed: Annotated[int, Field(ge=0, lt=2**64)] = 0
+    """Of everything random: noise, jitter, what the link loses. The same seed gives the same bytes."""
     duration_s: Annotated[float, Field(gt=0, le=2.6e11)] = 600.0
     """A whole number of periods."""
     period_s: Annotated[float, Field(ge=0.001, le=60)] = 0.5
@@ -62,7 +63,8 @@ class Scenario(Section):
     clock: Clock = Clock()
     timing: Timing = Timing()
     board: Board = "process"
-    """process, inproc, none, or where a board that already runs listens"""
+    """process: the Python board in a process of its own; inproc: in this one; native, cortex-m, qemu: the C firmware;
+    none: no board flies, but `schedule`; or where a board that already runs listens."""
     link: Link = Link()
     out: str | None = None
     """Run directory; null: runs/NAME-NNN"""

@@ -65,7 +65,7 @@ class Fault(Section):
     scale: Factor | None = None
     """For wrong: a factor, default 1."""
     period_s: Lapse | None = None
-    """For slow."""
+    """For slow: from one new value to the next."""
     delay_s: Annotated[float, Field(gt=0, le=4000)] | None = None
     """For delayed; rounded up to whole periods of the run."""
     fraction: Annotated[float, Field(ge=0, le=1)] | None = None
@@ -80,28 +80,30 @@ class AttitudeFault(Fault):
     """A fault of the attitude sensor or the star tracker."""
 
     bias_deg: Bias | None = None
-    """For wrong: what is added; star tracker: a turn about the body axes."""
+    """For wrong, attitude sensor and star tracker: what is added; star tracker: a turn about the body axes."""
 
 
 class RateFault(Fault):
     """A fault of the gyros."""
 
     bias_degps: Bias | None = None
-    """For wrong: what is added."""
+    """For wrong, gyros: what is added."""
 
 
 class WheelFault(Fault):
     """A fault of wheels or thrusters: it acts on the command, and their limits on what comes of it."""
 
     bias_Nm: Bias | None = None
-    """For wrong: what is added."""
+    """For wrong, wheels and thrusters: what is added to the command."""
 
 
 class Wheels(Section):
     """Three reaction wheels along the body axes; one number means the same for all three."""
 
     torque_max_Nm: LimitTriple = (0.1, 0.1, 0.1)
+    """Largest torque of each wheel, either way; null: no limit."""
     momentum_max_Nms: LimitTriple = (0.3, 0.3, 0.3)
+    """Largest momentum of each wheel, beyond which it gives no torque that adds to it; null: no limit."""
     inertia_kgm2: OneOrThreeNotNegative = (0.0, 0.0, 0.0)
     """Spin inertia; 0: the momentum is just the integral of the negative torque."""
     initial_speed_radps: OneOrThree = (0.0, 0.0, 0.0)
@@ -172,7 +174,9 @@ class AttitudeSensor(Section):
     """Euler angles of the body relative to attitude.frame."""
 
     enabled: bool = True
+    """Whether the satellite has one."""
     noise_deg: NotNegative = 0.0
+    """White, Gaussian: standard deviation of each angle."""
     bits: Annotated[int, Field(ge=0, le=32)] = 0
     """LSB 360 deg / 2^bits; 0: the wire's own 2^-32 turn."""
     faults: tuple[AttitudeFault, ...] = ()
@@ -184,7 +188,9 @@ class QuaternionSensor(Section):
     """Star tracker: q_BN."""
 
     enabled: bool = False
+    """Whether the satellite has one."""
     noise_deg: NotNegative = 0.0
+    """White, Gaussian: standard deviation of a small turn about each body axis."""
     bits: Annotated[int, Field(ge=0, le=31)] = 0
     """LSB 2 / 2^bits of a component; 0: the wire's own 2^-30."""
     faults: tuple[AttitudeFault, ...] = ()
@@ -196,9 +202,11 @@ class RateSensor(Section):
     """Gyros: omega_BN in body axes."""
 
     enabled: bool = False
+    """Whether the satellite has them."""
     noise_degps: NotNegative = 0.0
+    """White, Gaussian: standard deviation of each rate."""
     lsb_degps: NotNegative = 0.0
-    """0: the wire's own, 2^-wire.rate_bits rad/s."""
+    """Step of a reading; 0: the wire's own, 2^-wire.rate_bits rad/s."""
     faults: tuple[RateFault, ...] = ()
     """What goes wrong with it on purpose."""
     sampling: OwnSampling = OwnSampling()

@@ -84,10 +84,11 @@ class JitterFault(Section):
     distribution: Literal["uniform", "normal", "exponential"] = "uniform"
     """Cut off at 0 and max_s; uniform over the whole span."""
     max_s: NotNegative
+    """The most there can be."""
     mean_s: Positive | None = None
-    """normal and exponential, before they are cut off."""
+    """For normal and exponential: the mean, before they are cut off."""
     sigma_s: Positive | None = None
-    """normal"""
+    """For normal: the standard deviation, before it is cut off."""
 
     def model(self) -> Jitter:
         """For the channel."""
@@ -114,7 +115,7 @@ class OneWay(Section):
     jitter: JitterFault | None = None
     """On top of both, another one for every frame."""
     disconnect: Spans = None
-    """[[from_s, to_s], ...]: every frame that is on the wire at any time of it is lost."""
+    """Spans of time, [[from_s, to_s], ...]: every frame that is on the wire at any time of one is lost."""
     baud: Annotated[int, Field(gt=0)] | None = None
     """Bit rate of this direction; null: link.baud."""
 

@@ -29,6 +29,7 @@ class Sampling(Section):
     period_s: Time | None = None
     """Its own sampling period, held in between; null or 0: it looks for each tick, at t_k less the delay."""
     delay_s: Time = 0.0
+    """How late the board gets to know what the sensor saw."""
     delay: Kind = "transport"
     """transport: each sample comes delay_s later; unit: a unit-delay block of sample time delay_s behind the sensor."""
     jitter_s: Time = 0.0
@@ -42,9 +43,11 @@ class OwnSampling(Section):
     period_s: Time | None = None
     """0: it looks for each tick."""
     delay_s: Time | None = None
+    """How late the board gets to know what it saw."""
     delay: Kind | None = None
     """transport or unit."""
     jitter_s: Time | None = None
+    """Most that a sampling instant is moved, either way."""
 
 
 class Times(NamedTuple):

@@ -89,7 +89,7 @@ def _name_choices(schema: Schema) -> None:
         (schema, "board", _either(BOARDS, r"^(serial|udp)://\S+$")),
         (known["Link"], "url", _either(LINKS, r"^(serial:///?\S+|udp://[^\s:]+:\d+)$")),
         (known["Clock"], "mode", clocks),
-        (known["Plant"], "kind", {"enum": list(PLANTS)}),
+        (known["Plant"], "kind", _either(list(PLANTS), r"\.py:")),
         (known["Guidance"], "profile", {"enum": list(PROFILES)}),
         (known["Requirement"], "metric", {"enum": metrics}),
         (known["Law"], "name", _either(law_names, r"\.py:")),
@@ -159,7 +159,7 @@ def _params(table: LawTable) -> Schema:
     properties = {}
     for param in laws.params_of(table):
         word = param.words[0]
-        about = word.about.removesuffix(", x")
+        about = word.about.removesuffix(", x") + _of_null(word)
         properties[param.name] = {
             **_shape(param),
             "default": defaults[param.name],
@@ -167,6 +167,13 @@ def _params(table: LawTable) -> Schema:
         }
     about = f"Parameters of law {table.name}, version {table.version}."
     return {"description": about, "type": "object", "properties": properties, "additionalProperties": False}
+
+
+def _of_null(word: Word) -> str:
+    """What null means there, if it may be."""
+    if word.default == AUTOMATIC:
+        return "; null: as many as fit"
+    return "; null: no limit" if math.isinf(word.maximum) else ""
 
 
 def _shape(param: laws.Param) -> Schema:

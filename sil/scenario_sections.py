@@ -209,15 +209,20 @@ class Sine(Section):
     """amplitude * sin(2 pi t / period + phase), torque on the body in body axes, t = simulation time."""
 
     amplitude_Nm: Triple
+    """Peak torque about each body axis."""
     period_s: Positive
+    """Of the oscillation."""
     phase_deg: float = 0.0
+    """At t = 0."""
 
 
 class Disturbance(Section):
     """Torques from outside, in body axes; `disturbance_Nm: [x, y, z]` is short for the constant part."""
 
     constant_Nm: Triple = (0.0, 0.0, 0.0)
+    """The part that never changes."""
     sine: tuple[Sine, ...] = ()
+    """Oscillating parts; they add up."""
 
 
 class Initial(Section):
@@ -232,15 +237,18 @@ class Initial(Section):
     rate_kind: Literal["euler", "body_relative", "body_inertial"] = "euler"
     """Euler angle rates, body rate relative to the frame, or omega_BN in body axes."""
     rate_degps: Triple = (0.0, 0.0, 0.0)
+    """In the sense of rate_kind."""
 
 
 class Orbit(Section):
     """Circular orbit; ascending node on the inertial x axis."""
 
     radius_m: Positive = 6978137.0
+    """From the centre of the Earth."""
     mu: Positive = 3.986004418e14
-    """Gravitational parameter in m^3/s^2."""
+    """Gravitational parameter, m^3/s^2."""
     inclination_deg: float = 97.8
+    """Of the orbital plane to the equator."""
     u0_deg: float = 0.0
     """Argument of latitude at t = 0."""
 
@@ -257,6 +265,7 @@ class Plant(Section):
     step_s: Positive = 0.05
     """Largest integration step; lowered so that a period is a whole number of steps."""
     gravity_gradient: bool = True
+    """The torque 3 w0^2 c x I c, c the direction of the nadir in body axes."""
     disturbance_Nm: Disturbance = Disturbance()
     initial: Initial = Initial()
     orbit: Orbit = Orbit()
@@ -268,6 +277,8 @@ class Attitude(Section):
     sequence: Literal[321, 123] = 321
     """321: R1(phi) R2(theta) R3(psi), yaw first; 123: intrinsic roll first."""
     frame: Literal["lvlh", "inertial"] = "lvlh"
+    """What the angles are relative to: the orbital frame (x along-track, y = -orbit normal, z nadir) or the inertial
+    one."""
 
 
 class Law(Section):
@@ -276,6 +287,7 @@ class Law(Section):
     name: str = "appc"
     """A law of the product, or ./my_law.py:MyLaw."""
     form: Literal["fixed", "float"] = "fixed"
+    """Arithmetic of the law: the integers of the microcontroller, or float64."""
     version: int | None = None
     """null: the newest."""
     params: dict[str, Any] = Field(default_factory=dict)
@@ -286,7 +298,9 @@ class Row(Section):
     """From t_s on, the set-point is attitude_deg."""
 
     t_s: NotNegative
+    """Simulation time."""
     attitude_deg: Triple
+    """The set-point, Euler angles in attitude.sequence relative to attitude.frame."""
 
 
 class Guidance(Section):
@@ -305,6 +319,7 @@ class Guidance(Section):
     rate_limit_degps: Positive | None = None
     """Limit of the reference's rate, per axis; with reference none the set-point turns no faster than this."""
     accel_limit_degps2: Positive | None = None
+    """Limit of the reference's acceleration, per axis; null: none."""
     setpoint_source: Literal["table", "sample"] = "table"
     """table: the board flies the rows of CONFIG; sample: it takes the set-point from each SAMPLE."""
 
@@ -315,7 +330,9 @@ class Wire(Section):
     torque_bits: Annotated[int, Field(ge=8, le=30)] | None = None
     """null: 30, lowered until the torque limit fits; 20 without a limit."""
     momentum_bits: Annotated[int, Field(ge=8, le=30)] = 28
+    """Of the wheels' momentum."""
     rate_bits: Annotated[int, Field(ge=8, le=30)] = 28
+    """Of the rates."""
 
 
 class Clock(Section):
@@ -353,6 +370,7 @@ class Metrics(Section):
     """What counts."""
 
     from_tick: Count = 0
+    """First tick that metrics look at, to leave out the start."""
     last_s: Positive = 20.0
     """How much of the end of the run the residual_ metrics look at."""
     diverged_deg: Positive | None = 80.0
@@ -363,6 +381,10 @@ class Requirement(Section):
     """One line of the verdict: a metric and where it has to be; exactly one of below, above, between."""
 
     metric: str
+    """What is measured, such as rms_error_deg.yaw."""
     below: float | None = None
+    """In the metric's unit."""
     above: float | None = None
+    """In the metric's unit."""
     between: Interval = None
+    """[lowest, highest], in the metric's unit."""

@@ -12,7 +12,7 @@ from sil.scenario_errors import Path, Problem, Where, key_of, one_of, shown, unk
 WhereOf = Callable[[Path], Where]
 
 # Longest suffix first: _degps2 before _degps before _s.
-UNITS = {
+UNITS = {  # by how the name of a key ends
     "_degps2": "deg/s^2",
     "_degps": "deg/s",
     "_radps": "rad/s",
@@ -22,8 +22,16 @@ UNITS = {
     "_deg": "deg",
     "_ticks": "ticks",
     "_s": "s",
+    "_ms": "ms",
+    "_us": "us",
     "_m": "m",
     "_tick": "ticks",
+    "_percent": "%",
+    "hold_limit": "ticks",
+    "link_limit": "ticks",
+    "telemetry_every": "ticks",
+    "baud": "bit/s",
+    "bits": "bits",
 }
 PLAIN = {
     "float_type": "a number",

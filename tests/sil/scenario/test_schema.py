@@ -7,6 +7,7 @@ scenario and every broken one of test_broken_scenarios.py goes through both.
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,25 @@ def test_the_published_file_is_current() -> None:
 def test_it_is_a_schema_of_draft_7() -> None:
     Draft7Validator.check_schema(scenario_schema())
     assert "prefixItems" not in text()  # a later draft's word, which editors ignore
+
+
+def test_every_key_says_what_it_means() -> None:
+    """More than its unit: an editor shows it, and so does docs/reference/scenario.md."""
+    schema = scenario_schema()
+    models = {"Scenario": schema, **schema["$defs"]}
+    mute = [
+        f"{name}.{key}"
+        for name, model in models.items()
+        for key, said in model["properties"].items()
+        if "$ref" not in said and not re.sub(r"^\[[^]]*\]", "", said.get("description", "")).strip()
+    ]
+    assert mute == []
+    assert [name for name, model in models.items() if not model.get("description")] == []
+
+
+def test_a_plant_of_ones_own_is_valid() -> None:
+    assert refused("plant: {kind: ./my_plant.py:MyPlant}") == []
+    assert refused("plant: {kind: no-such-plant}")
 
 
 @pytest.mark.parametrize("info", list_scenarios(), ids=lambda info: info.name)
