@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from importlib.metadata import version as version_of
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
@@ -20,30 +19,37 @@ if TYPE_CHECKING:
 
 DOCS = Path(__file__).resolve().parent
 REPO = DOCS.parent
-sys.path.insert(0, str(REPO))  # autodoc reads the product that stands here
 PAGES_FROM = {"reference/wire": "protocol/SPEC.md", "changelog": "CHANGELOG.md"}
 LINKS_TO = {source: f"{page}.md" for page, source in PAGES_FROM.items()} | {"README.md": "index.md"}
+ORDER: dict[str, tuple[str, ...]] = {  # of the pages of a folder in the sidebar; others come behind these, by name
+    "concepts": (
+        "laboratory-cable-board", "timing-contract", "fixed-point", "determinism", "ladder", "faults-of-the-link",
+        "verdicts-and-metrics",
+    ),
+    "how-to": (
+        "run-a-scenario", "report", "live-view", "read-logs", "notebooks", "compare-runs", "write-a-scenario",
+        "own-law", "own-plant", "own-board", "law-in-c", "two-machines", "real-time", "faults-on-purpose",
+        "late-sensors", "many-runs", "margin-map", "design-a-controller", "ci", "bench", "recover", "troubleshoot",
+    ),
+    "reference": ("cli", "scenario", "scenarios", "python", "topics", "wire", "glossary"),
+}  # fmt: skip
 PLAIN = ("crc", "frame", "law", "layout", "packet", "stream")  # names that SPEC.md gives its blocks
+FOLDER = re.compile(r"^([\w-]+)/\*$", re.MULTILINE)
 LINK = re.compile(r"(?<=\]\()([^)\s#]+)(?=[)#])")
 
 project = "attitude-sil"
 author = "The attitude-sil engineers"
 release = version_of("attitude-sil")
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_copybutton"]
+extensions = ["myst_parser", "sphinx_copybutton"]
 exclude_patterns = ["examples", "pictures", "_*"]
 nitpicky = True
-nitpick_ignore_regex = [(r"py:.*", r"(?!(sil|protocol|firmware_sim)\b).*")]  # no inventories of others: no network
+smartquotes = False  # --clock is no dash
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
 copybutton_prompt_text = r"\$ "
 copybutton_prompt_is_regexp = True
-
-autodoc_typehints = "signature"
-autodoc_member_order = "bysource"
-autodoc_use_type_comments = False
-python_maximum_signature_line_length = 90
 
 html_theme = "furo"
 html_title = "attitude-sil"
@@ -52,13 +58,26 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = html_show_copyright = False
-html_use_index = True
+html_use_index = False
 pygments_style, pygments_dark_style = "tango", "github-dark"
 html_theme_options = {
     "top_of_page_buttons": [],
     "light_css_variables": {"color-brand-primary": "#0072B2", "color-brand-content": "#0072B2"},
     "dark_css_variables": {"color-brand-primary": "#56B4E9", "color-brand-content": "#56B4E9"},
 }
+
+
+def in_order(app: Sphinx, page: str, text: list[str]) -> None:
+    """`concepts/*` in the index becomes the pages of that folder, as ORDER has them."""
+    if page == "index":
+        text[0] = FOLDER.sub(lambda found: "\n".join(_pages_of(found[1])), text[0])
+
+
+def _pages_of(folder: str) -> list[str]:
+    known = ORDER.get(folder, ())
+    names = sorted(file.stem for file in (DOCS / folder).glob("*.md"))
+    names.sort(key=lambda name: known.index(name) if name in known else len(known))
+    return [f"{folder}/{name}" for name in names]
 
 
 def of_elsewhere(app: Sphinx, page: str, text: list[str]) -> None:
@@ -85,4 +104,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
     for name in PLAIN:
         app.add_lexer(name, TextLexer)
     app.connect("source-read", of_elsewhere)
+    app.connect("source-read", in_order)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

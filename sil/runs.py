@@ -37,12 +37,12 @@ class EventRow(NamedTuple):
     """One event; origin `board` or `laboratory`."""
 
     tick: int
-    t_s: float
-    code: int
-    origin: str
-    a: int
-    b: int
-    text: str
+    t_s: float  # s, simulation time
+    code: int  # as in protocol/events.py
+    origin: str  # board or laboratory
+    a: int  # first number, meaning by code
+    b: int  # second number
+    text: str  # what happened, in words
 
 
 class PacketRow(NamedTuple):
@@ -50,8 +50,8 @@ class PacketRow(NamedTuple):
 
     tick: int  # the tick it is filed under; CONFIG: its session's first
     direction: str  # up (to the board) or down
-    type: int
-    sequence: int
+    type: int  # of frame, as in SPEC.md
+    sequence: int  # counts per direction, modulo 2^16
     fate: str  # delivered, late, dropped, corrupted, in_flight
     packet: bytes  # header to CRC
     encoded: bytes  # bytes on the wire where a byte fault altered them, else empty

@@ -22,7 +22,7 @@ Vector = npt.NDArray[np.float64]
 class Motion(NamedTuple):
     """The truth at one instant; `R` is the reference frame named by `attitude.frame` (lvlh: O, inertial: N)."""
 
-    t_ns: int
+    t_ns: int  # ns, simulation time
     q_BN: Vector  # (4,) scalar first, continuous in sign
     omega_BN_B: Vector  # (3,) rad/s, body axes
     momentum_B: Vector  # (3,) N m s, absolute wheel momentum about the body axes

@@ -43,15 +43,15 @@ class LawFailed(RuntimeError):
 class LawSample:
     """What a user's law is given at tick k. Arrays are float64; body axes; angles [x, y, z] as configured."""
 
-    tick: int
-    period_s: float
+    tick: int  # k
+    period_s: float  # T_s
     fresh: bool  # this tick's reading is there
     attitude_rad: np.ndarray  # (3,) Euler angles
     quaternion: np.ndarray  # (4,) scalar first, zero where there is no such sensor
     rate_radps: np.ndarray  # (3,) body rate, zero where there is no such sensor
     setpoint_rad: np.ndarray  # (3,) r(k)
     reference_rad: np.ndarray  # (3,) reference model ym(k)
-    reference_rate_radps: np.ndarray  # (3,)
+    reference_rate_radps: np.ndarray  # (3,) its rate
     applied_Nm: np.ndarray  # (3,) torque that acts from now on
     momentum_Nms: np.ndarray  # (3,) wheels
 

@@ -107,7 +107,7 @@ def _rows(parameters: list[Parameter]) -> Iterator[tuple[str, str]]:
     for each in parameters:
         if each.panel != panel:
             panel = each.panel
-            yield f"**{panel}**", ""
+            yield "", f"**{panel}**"
         yield f"`{each.written}`", each.about
 
 
