@@ -88,12 +88,16 @@ def markdown() -> str:
 
 
 def found(place: str) -> Source:
-    """`module:Name` in its file."""
+    """`module:Name` as it is defined there, or where this module has it from; raises LookupError."""
     module, _, name = place.partition(":")
     path = REPO.joinpath(*module.split("."))
     text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
-    nodes = [node for node in ast.parse(text).body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
-    return Source(module, next(node for node in nodes if node.name == name), text.splitlines())
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == name:
+            return Source(module, node, text.splitlines())
+        if isinstance(node, ast.ImportFrom) and any(each.name == name for each in node.names):
+            return found(f"{node.module}:{name}")._replace(module=module)
+    raise LookupError(f"{place}: no such thing; what the page shows stands in CHAPTERS of {__file__}")
 
 
 def _entry(source: Source) -> Iterator[str]:
