@@ -58,7 +58,7 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = html_show_copyright = False
-html_use_index = False
+html_use_index = html_show_search_summary = False  # a page opened from a disk may not fetch others
 pygments_style, pygments_dark_style = "tango", "github-dark"
 html_theme_options = {
     "top_of_page_buttons": [],

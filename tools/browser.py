@@ -1,6 +1,7 @@
 """Headless Chromium, spoken to over a pipe in the DevTools protocol: no driver, no package, no port.
 
-Every request that a page makes beyond its own file is refused and remembered; so is whatever it writes to the console.
+Every request that a page makes beyond its own file, or the folder it may load from, is refused and remembered; so is
+whatever it writes to the console.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import re
 import select
 import shutil
 import subprocess
@@ -47,7 +49,7 @@ class Browser:
         self._rest, self._number, self._session = b"", 0, ""
         self.console: list[str] = []
         self.requests: list[str] = []
-        self._file = ""
+        self._file, self._folder = "", ""
         self._attach()
 
     def __enter__(self) -> Browser:
@@ -62,8 +64,11 @@ class Browser:
 
     # -- what tests ask ------------------------------------------------------------------------------------------
 
-    def open(self, file: Path, width: int = 1400, height: int = 900, dark: bool = False) -> None:
-        """Show a file, at this size, and wait until it has loaded."""
+    def open(
+        self, file: Path, width: int = 1400, height: int = 900, dark: bool = False, folder: Path | None = None,
+        query: str = "",
+    ) -> None:  # fmt: skip
+        """Show a file, at this size, and wait until it has loaded. `folder`: it may load what lies in there."""
         self.console.clear()
         self.requests.clear()
         phone = width < 700
@@ -71,8 +76,8 @@ class Browser:
         self.call("Emulation.setDeviceMetricsOverride", **size)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         self.call("Emulation.setEmulatedMedia", media="", features=[scheme])
-        self._file = file.resolve().as_uri()
-        self.call("Page.navigate", url=self._file)
+        self._file, self._folder = file.resolve().as_uri(), "" if folder is None else folder.resolve().as_uri() + "/"
+        self.call("Page.navigate", url=self._file + query)
         self.until("document.readyState === 'complete'")
 
     def ask(self, expression: str) -> Any:
@@ -142,7 +147,7 @@ class Browser:
         method, told = event.get("method"), event.get("params", {})
         if method == "Fetch.requestPaused":
             url = told["request"]["url"]
-            own = url.partition("#")[0] == self._file
+            own = re.split("[?#]", url)[0] == self._file or bool(self._folder and url.startswith(self._folder))
             if not own:
                 self.requests.append(url)
             reply = {"requestId": told["requestId"]} | ({} if own else {"errorReason": "BlockedByClient"})

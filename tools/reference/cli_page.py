@@ -95,10 +95,11 @@ def _verb(verb: Verb) -> Iterator[str]:
 
 
 def _usage(name: str, parameters: list[Parameter]) -> str:
-    words = [each.written + ("..." if each.repeats else "") for each in parameters if not each.is_option]
+    given = [each for each in parameters if not each.is_option]
+    words = [each.written.removesuffix("...") + ("..." if each.repeats else "") for each in given]
     needed = [f"{each.written}" for each in parameters if each.is_option and each.required]
     free = any(each.is_option and not each.required for each in parameters)
-    shown = [word if each.required else f"[{word}]" for word, each in zip(words, parameters, strict=False)]
+    shown = [word if each.required else f"[{word}]" for word, each in zip(words, given, strict=True)]
     return " ".join([name, *shown, *needed, *(["[OPTIONS]"] if free else []), *([] if parameters else ["KIND ..."])])
 
 

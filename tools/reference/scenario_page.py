@@ -66,7 +66,7 @@ def markdown() -> str:
     models = schema["$defs"]
     top = list(_keys("", schema, models))
     sections = [key for key in top if key.model]
-    parts = [HEAD, f"## {OWN}\n", _table([key for key in top if not key.model])]
+    parts = [HEAD, f"## {OWN}\n", _table(top)]
     parts += [part for key in sections for part in _section(key, models)]
     return "\n".join([*parts, *_shared(top, models), *_metrics()])
 
@@ -144,7 +144,8 @@ def _row(key: Key) -> tuple[str, ...]:
 
 def _holds(key: Key) -> str:
     """What a key with a section in it may be: a link to the table of its keys, or those that stand below it."""
-    heading, is_list = HEADING_OF.get(key.model), key.path.endswith("[]")
+    name, is_list = key.path.removesuffix("[]"), key.path.endswith("[]")
+    heading = HEADING_OF.get(key.model) or ("" if "." in name else name)
     said = f"[{heading}](#{heading.lower().replace(' ', '-')})" if heading else "the keys below"
     others = [_accepted(each) for each in key.schema.get("anyOf", ()) if "$ref" not in each]
     return " or ".join([f"list: {said}" if is_list else said, *others])
