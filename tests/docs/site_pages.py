@@ -41,7 +41,10 @@ class Link(NamedTuple):
 
 
 class SitePage(HTMLParser):
-    """One HTML file. `clicked`: links to follow; `loaded`: what opens with it; `anchors`: ids; `words`: its text."""
+    """One HTML file. `clicked`: links to follow; `loaded`: what opens with it; `anchors`: ids; `words`: its text.
+
+    `unsaid`: pictures without a text for those who do not see them.
+    """
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -49,12 +52,15 @@ class SitePage(HTMLParser):
         self.clicked: list[Link] = []
         self.loaded: list[Link] = []
         self.anchors: set[str] = set()
+        self.unsaid: list[str] = []
         self.words = ""
         self.feed(path.read_text(encoding="utf-8"))
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         found = {name: value or "" for name, value in attrs}
         self.anchors |= {found[name] for name in ("id", "name") if name in found}
+        if tag == "img" and not found.get("alt"):
+            self.unsaid.append(found.get("src", ""))
         if tag == "a" and "href" in found:
             self.clicked.append(Link(self.path, found["href"]))
         if tag == "link" and set(found.get("rel", "").split()) & NOT_LOADED:

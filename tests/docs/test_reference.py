@@ -101,7 +101,7 @@ def test_every_key_of_a_scenario_is_there() -> None:
 
 
 def test_every_row_says_unit_default_range_and_meaning() -> None:
-    text = (REFERENCE / "scenario.md").read_text(encoding="utf-8")
+    text = (REFERENCE / "scenario.md").read_text(encoding="utf-8").replace("\u00a0", " ")
     rows = [re.split(r" (?<!\\)\| ", f" {row} ") for row in re.findall(r"^\| (`.*) \|$", text, re.MULTILINE)]
     rows = [[cell.strip() for cell in row] for row in rows if len(row) == 5]
     assert len(rows) > 200

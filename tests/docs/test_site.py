@@ -77,6 +77,10 @@ def test_nothing_is_loaded_from_anywhere_else(site: Path, pages: dict[Path, Site
     assert list(addresses_in_styles(site)) == []
 
 
+def test_every_picture_has_a_text_in_its_place(pages: dict[Path, SitePage]) -> None:
+    assert {page.path.name: page.unsaid for page in pages.values() if page.unsaid} == {}
+
+
 def test_the_pages_that_stand_elsewhere_are_those_files(site: Path, pages: dict[Path, SitePage]) -> None:
     for name, source in (("reference/wire", "protocol/SPEC.md"), ("changelog", "CHANGELOG.md")):
         headings = re.findall(r"^#+ ([^`\n]+)$", (REPO / source).read_text(), re.MULTILINE)

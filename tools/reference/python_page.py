@@ -19,8 +19,8 @@ HEAD = """# Python
 
 Made by `python -m tools.reference --write` of the sources; a test keeps it current. `help(sil.open_run)` says the same.
 
-Arrays are numpy's, float64 where nothing else is said; N is the number of ticks. Axes x, y, z are the body's (roll,
-pitch, yaw). `q_BN` is scalar first and maps body to inertial components, v_N = q v_B q\\* (Hamilton product).
+`Array` is a numpy array, `Vector` one of float64; N is the number of ticks. Axes x, y, z are the body's (roll, pitch,
+yaw). `q_BN` is scalar first and maps body to inertial components, v_N = q v_B q\\* (Hamilton product).
 """
 # Heading, what is said under it, and where each thing is defined.
 CHAPTERS: tuple[tuple[str, str, tuple[str, ...]], ...] = (

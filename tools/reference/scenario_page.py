@@ -46,6 +46,7 @@ PATTERNS = {
     r"\.py:": "`./FILE.py:CLASS`",
     "^(serial": "`serial://PATH`, `udp://HOST:PORT`",
 }
+NO_BREAK = "\u00a0"  # a space at which no line ends
 LONGEST = 8  # list that is written out as a default
 
 Schema = dict[str, Any]
@@ -139,7 +140,8 @@ def _table(keys: list[Key]) -> str:
 def _row(key: Key) -> tuple[str, ...]:
     default = "*needed*" if key.needed else _code(key.schema["default"]) if "default" in key.schema else ""
     may_be = _holds(key) if key.model else _accepted(key.schema)
-    return f"`{key.path.removesuffix('[]')}`", _unit(key.path, key.schema), default, may_be, _about(key.schema)
+    unit = _unit(key.path, key.schema).replace(" ", NO_BREAK)
+    return f"`{key.path.removesuffix('[]')}`", unit, default, may_be, _about(key.schema)
 
 
 def _holds(key: Key) -> str:
