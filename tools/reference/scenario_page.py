@@ -22,6 +22,7 @@ HEAD = """# Every key of a scenario
 
 Made by `python -m tools.reference --write` of the models that check a scenario; a test keeps it current. An editor gets
 the same from the JSON Schema, `sil schema`, and `sil check` says what a schema cannot: whether keys fit each other.
+How to write one: [write a scenario](../how-to/write-a-scenario.md); those that are built in: [scenarios](scenarios.md).
 
 A scenario is one YAML file. Every key has a default unless it says *needed*, so that an empty file is a scenario.
 A key's name ends with its unit. Triples are `[x, y, z]` in body axes, angles are Euler angles in `attitude.sequence`.
@@ -79,6 +80,7 @@ def _section(section: Key, models: dict[str, Schema]) -> Iterator[str]:
     yield f"## {section.path.removesuffix('[]')}\n\n{_about(models[section.model])}\n"
     yield _table(list(_below(section, models)))
     if section.path == "law":
+        yield "Fractional bits and TELEMETRY of each law: [the wire, section 9](../../protocol/SPEC.md#9-laws).\n"
         yield from (part for law in _newest() for part in _law(law, models))
 
 
@@ -128,7 +130,8 @@ def _places(key: Key, models: dict[str, Schema]) -> Iterator[tuple[str, str]]:
 
 
 def _metrics() -> Iterator[str]:
-    yield "## Metrics\n\nWhat `require[].metric` may name: the name, a dot, and one of the parts.\n"
+    yield "## Metrics\n\nWhat `require[].metric` may name: the name, a dot, and one of the parts. What each measures: "
+    yield "[verdicts and metrics](../concepts/verdicts-and-metrics.md).\n"
     rows = [(f"`{name}`", _unit(name, {}), ", ".join(f"`{part}`" for part in parts)) for name, parts in METRICS.items()]
     yield table(("metric", "unit", "parts"), rows)
 
