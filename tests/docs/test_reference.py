@@ -64,7 +64,7 @@ def test_every_verb_has_its_options_examples_and_exit_codes(verb: str) -> None:
             assert [row for row in rows if not re.search(row, text, re.MULTILINE)] == []
             assert parameter.help.split("`")[0].replace("*", "\\*") in text
     assert f"\n{verb}" in text and "| exit code | meaning |\n" in text and "Examples:" in text
-    assert "[bold]" not in text and "[/]" not in text
+    assert not re.search(r"\[/?(bold|dim|cyan)?\]|None`", text)
 
 
 # -- the scenario --------------------------------------------------------------------------------------------------

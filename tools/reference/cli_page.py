@@ -141,22 +141,23 @@ def _parameter(hint: Any, default: Any) -> Parameter:
     info: ArgumentInfo | OptionInfo = hint.__metadata__[0]
     kind = hint.__origin__
     is_option, required = isinstance(info, OptionInfo), default is inspect.Parameter.empty
-    written = str(info.metavar)
+    written = info.metavar or ("PATH" if "Path" in str(kind) else "TEXT")
     if is_option:
         flags = ", ".join([str(info.default), *(info.param_decls or ())])
-        written = flags if kind is bool else f"{flags} {written}"
+        written = flags if "bool" in str(kind) else f"{flags} {written}"
     about = " ".join(filter(None, (_prose(info.help or ""), _range(info), _default(info, default))))
     return Parameter(written, is_option, required, "list" in str(kind), info.rich_help_panel or "", about)
 
 
 def _range(info: ArgumentInfo | OptionInfo) -> str:
-    return "" if info.min is None else f"From {info.min}" + ("." if info.max is None else f" to {info.max}.")
+    return "" if info.min is None else f"From {info.min:.10g}" + ("." if info.max is None else f" to {info.max:.10g}.")
 
 
 def _default(info: ArgumentInfo | OptionInfo, default: Any) -> str:
     """The default as the help shows it; flags and what is looked for elsewhere have none."""
     known = not any(default is each for each in (inspect.Parameter.empty, None, False))
-    return f"Default: `{default}`." if known and info.show_default else ""
+    said = f"{default:.10g}" if isinstance(default, float) else default
+    return f"Default: `{said}`." if known and info.show_default else ""
 
 
 # -- text --------------------------------------------------------------------------------------------------------------
