@@ -4,7 +4,7 @@ VENV   ?= .venv
 BIN     = $(VENV)/bin
 JOBS   ?= 2
 
-.PHONY: check lint types imports test docs golden firmware bench fuzz soak clean
+.PHONY: check lint types imports test docs pictures golden firmware bench fuzz soak clean
 
 check: lint types imports test
 
@@ -35,6 +35,10 @@ test: $(VENV)/.installed tests/e2e/node_modules/.installed
 # The site, in build/docs: open build/docs/index.html
 docs: $(VENV)/.installed
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --doctree-dir build/doctrees docs build/docs
+
+# The documents' pictures, of runs that it makes: some minutes, and a Chromium for those of the report.
+pictures: $(VENV)/.installed
+	$(BIN)/python -m tools.pictures
 
 golden: $(VENV)/.installed
 	$(BIN)/python -m tools.make_vectors

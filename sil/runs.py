@@ -116,6 +116,12 @@ class Run:
     def __repr__(self) -> str:
         return f"<Run {self.name}: {len(self)} ticks of {self.period_s:g} s, {self.end.get('reason')}, {self.path}>"
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        from sil.run_table import table_of
+
+        return table_of(self)
+
     @property
     def tick(self) -> Array:
         """(N,) tick numbers."""

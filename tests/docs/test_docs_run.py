@@ -248,7 +248,7 @@ def lasting(output: str) -> list[list[str]]:
 
 def test_the_readmes_other_commands_run(readme_run: tuple[Path, str]) -> None:
     others = [command for command in readme_commands() if command.startswith("sil ")]
-    assert [command.split()[1] for command in others] == ["report", "plot", "replay"]
+    assert [command.split()[1] for command in others] == ["plot", "report", "replay"]
     assert "identical: 1200 ticks, 1 session" in [shell(command, readme_run[0]).strip() for command in others]
 
 

@@ -46,6 +46,17 @@ def test_names_and_units(run: Run) -> None:
         run["roll"]
 
 
+def test_a_notebook_shows_figures_of_numbers_only_and_nothing_of_the_file_is_markup(run: Run) -> None:
+    """Protects: ticks without a COMMAND or a reference make no figure NaN; a name cannot write into the page."""
+    torque = 1e3 * np.sqrt((run.applied_Nm**2).mean(axis=0))
+    shown = run._repr_html_()
+    assert "rms torque, mN m</th>" + "".join(f"<td>{value:.4g}</td>" for value in torque) in shown
+    assert "nan" not in shown and f"{len(run.names)} names" in shown
+    named = open_run(run.path)
+    named.name = "<script>alert(1)</script>"
+    assert "<script>" not in named._repr_html_()
+
+
 def test_truth_and_time(run: Run) -> None:
     assert np.array_equal(run["tick"], np.arange(200))
     assert np.array_equal(run["t_s"], np.arange(200) * PERIOD_S)
