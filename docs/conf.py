@@ -29,13 +29,15 @@ ORDER: dict[str, tuple[str, ...]] = {  # of the pages of a folder in the sidebar
     "how-to": (
         "run-a-scenario", "report", "live-view", "read-logs", "notebooks", "compare-runs", "write-a-scenario",
         "own-law", "own-plant", "own-board", "law-in-c", "two-machines", "real-time", "faults-on-purpose",
-        "late-sensors", "many-runs", "margin-map", "design-a-controller", "ci", "bench", "recover", "troubleshoot",
+        "late-sensors", "many-runs", "margin-map", "design-a-controller", "ci", "doctor", "bench", "recover",
+        "troubleshoot",
     ),
+    "papers": ("five-papers",),
     "reference": ("cli", "scenario", "scenarios", "python", "topics", "wire", "glossary"),
 }  # fmt: skip
 PLAIN = ("crc", "frame", "law", "layout", "packet", "stream")  # names that SPEC.md gives its blocks
 FOLDER = re.compile(r"^([\w-]+)/\*$", re.MULTILINE)
-LINK = re.compile(r"(?<=\]\()([^)\s#]+)(?=[)#])")
+LINK = re.compile(r"(?<=\]\()([^)\s#]+)(#[^)\s]+)?(?=\))")
 
 project = "attitude-sil"
 author = "The attitude-sil engineers"
@@ -87,16 +89,17 @@ def of_elsewhere(app: Sphinx, page: str, text: list[str]) -> None:
         here = REPO / PAGES_FROM[page]
         app.env.note_dependency(str(here), docname=page)
         text[0] = here.read_text(encoding="utf-8")
-    text[0] = LINK.sub(lambda found: _relinked(found[1], here, page), text[0])
+    text[0] = LINK.sub(lambda found: _relinked(found[1], found[2] or "", here, page), text[0])
 
 
-def _relinked(target: str, here: Path, page: str) -> str:
+def _relinked(target: str, anchor: str, here: Path, page: str) -> str:
     """A link of the file `here`, as it has to be on `page`; addresses, and what is no file, are left as they are."""
     if "://" in target or not (file := Path(os.path.normpath(here.parent / target))).exists():
-        return target
+        return target + anchor
     known = LINKS_TO.get(file.relative_to(REPO).as_posix()) if file.is_relative_to(REPO) else None
     found = DOCS / known if known else file
-    return PurePosixPath(os.path.relpath(found, (DOCS / page).parent)).as_posix()
+    kept = "" if file.name == "README.md" else anchor  # the front page has other headings
+    return PurePosixPath(os.path.relpath(found, (DOCS / page).parent)).as_posix() + kept
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
