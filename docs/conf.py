@@ -12,7 +12,9 @@ from importlib.metadata import version as version_of
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
+from docutils import nodes
 from pygments.lexers.special import TextLexer
+from sphinx.transforms import SphinxTransform
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -102,10 +104,28 @@ def _relinked(target: str, anchor: str, here: Path, page: str) -> str:
     return PurePosixPath(os.path.relpath(found, (DOCS / page).parent)).as_posix() + kept
 
 
+class InTheDark(SphinxTransform):
+    """A picture that has a sibling NAME-dark is shown on light paper, its sibling on dark paper."""
+
+    default_priority = 400
+
+    def apply(self) -> None:
+        for light in list(self.document.findall(nodes.image)):
+            uri = PurePosixPath(light["uri"])
+            sibling = uri.with_stem(f"{uri.stem}-dark")
+            if (DOCS / self.env.docname).parent.joinpath(sibling).is_file():
+                dark = light.deepcopy()
+                dark["uri"] = str(sibling)
+                for node, paper in ((light, "light"), (dark, "dark")):
+                    node["classes"] = [*node["classes"], f"only-{paper}"]
+                light.parent.insert(light.parent.index(light) + 1, dark)
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Sphinx calls this once."""
     for name in PLAIN:
         app.add_lexer(name, TextLexer)
+    app.add_transform(InTheDark)
     app.connect("source-read", of_elsewhere)
     app.connect("source-read", in_order)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -125,6 +125,15 @@ def test_a_page_fits_desktop_and_phone_and_asks_nobody(browser: Browser, site: P
         assert shade < 64 if dark else shade > 192
 
 
+def test_dark_paper_shows_dark_pictures(browser: Browser, site: Path) -> None:
+    shown = "[...document.querySelectorAll('article img')].filter((each) => each.offsetWidth).map((each) => each.src)"
+    for dark, name, other in ((False, "/report.png", "/report-dark.png"), (True, "/report-dark.png", "/report.png")):
+        browser.open(site / "index.html", dark=dark, folder=site)
+        pictures = browser.ask(shown)
+        assert any(each.endswith(name) for each in pictures)
+        assert not any(each.endswith(other) for each in pictures)
+
+
 def test_the_search_finds_a_key_and_an_option(browser: Browser, site: Path) -> None:
     for words, page in (("max_lateness_ms", "reference/scenario"), ("retry failed", "reference/cli")):
         browser.open(site / "search.html", folder=site, query=f"?q={words.replace(' ', '+')}")
