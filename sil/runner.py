@@ -17,6 +17,7 @@ from protocol.links import LinkError
 from sil import lateness
 from sil.checks import check
 from sil.link_counts import fates
+from sil.live_view import LiveOrder, NoView, live_view
 from sil.metrics import Judgement, as_json, judge, measure
 from sil.plain import plain
 from sil.realtime import Granted, granted, refuse_impossible, suspended_ns
@@ -45,24 +46,34 @@ NUMBERS_DEPEND_ON = ("numpy", "numba")
 
 
 def run_scenario(
-    scenario: Scenario, out: Path | None = None, watch: Watch | None = None, wired: bool = False
+    scenario: Scenario,
+    out: Path | None = None,
+    watch: Watch | None = None,
+    wired: bool = False,
+    live: LiveOrder | None = None,
 ) -> dict[str, Any]:
     """Run a scenario and leave a complete run directory; returns the summary, which is also in summary.json.
 
     out: run directory, refused if it is not empty; None makes runs/NAME-NNN. SIGINT and SIGTERM end the run at the
     next tick, with log and summary complete. Raises UsageError before anything was run; a link or board that fails
     later is in the summary (`failure`, exit code 3), since what was recorded until then is kept. wired: somebody else
-    starts the board; wait for it.
+    starts the board; wait for it. live: viewers may look on; the summary then says under `live` what they were shown.
     """
     watch = Guarded(watch) if watch is not None else Watch()
     refuse_hopeless(scenario)
     refuse_impossible(scenario.clock)
+    with live_view(live, scenario, watch) as view:
+        return _run(scenario, out, watch, wired, view)
+
+
+def _run(scenario: Scenario, out: Path | None, watch: Watch, wired: bool, view: NoView) -> dict[str, Any]:
     folder, made = new_run_dir(scenario.name, out)
     try:
         journal = Journal(folder / "run.journal")
     except JournalError as error:
         raise UsageError(str(error)) from None
     recorder = JournalRecorder(journal, watch.event)
+    view.look_at(folder)
     with StopRequests() as stop:
         outcome = _fly(scenario, folder, made, recorder, stop, watch, wired)
         watch.stage("seal")
@@ -72,6 +83,8 @@ def run_scenario(
         if report.too_late:
             watch.note(f"{report.too_late} records came too late to stand in their place in run.mcap: left out")
         summary = _summary(scenario, folder, outcome, report)
+        if (shown := view.finish(watch)) is not None:
+            summary["live"] = shown
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
         (folder / "summary.json").write_text(text, encoding="utf-8")
     if outcome.error is not None:

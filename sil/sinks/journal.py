@@ -292,13 +292,21 @@ class JournalReader:
         self._check_header()
 
     def __iter__(self) -> Iterator[Record]:
-        self.damage = ""
+        for record in self.follow():
+            if record is None:
+                return
+            yield record
+
+    def follow(self) -> Iterator[Record | None]:
+        """The same of a journal that is still being written: None wherever there is nothing more to read yet."""
         with open(self.path, "rb") as file:
             base = _FILE_HEADER.size
             file.seek(base)
             data = b""
             at = 0  # data[at] is the file's byte base + at
-            while block := file.read(READ_BLOCK):
+            while True:
+                self.damage = ""  # a record that was cut off may be whole by now
+                block = file.read(READ_BLOCK)
                 data = data[at:] + block
                 base += at
                 at = 0
@@ -310,8 +318,10 @@ class JournalReader:
                     yield record
                 if self.damage:
                     return
-            if at < len(data):
-                self.damage = f"{self.path}: the record at byte {base + at} is cut off after {len(data) - at} bytes"
+                if not block:
+                    if at < len(data):
+                        self.damage = f"{self.path}: the record at byte {base + at} is cut off after {len(data) - at} bytes"
+                    yield None
 
     def _next(self, data: bytes, at: int, base: int) -> Record | None:
         """The record at data[at:], or None: not all there yet, or damaged (then self.damage says so)."""

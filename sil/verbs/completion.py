@@ -48,6 +48,11 @@ CHECK_GROUPS = (
     ("reset", "what it does at boot"),
     ("end", "nothing unasked, no session left"),
 )
+ADDRESSES = (
+    ("127.0.0.1:8765", "this machine only, where viewers look first"),
+    ("127.0.0.1:0", "any free port"),
+    ("0.0.0.0:8765", "also other machines"),
+)
 LINKS = (
     ("pty", "pseudo-terminal, a serial line of this machine"),
     ("udp", "UDP on this machine"),
@@ -119,6 +124,11 @@ def one_of(*words: str) -> Callable[[str], list[str]]:
 
 def links(incomplete: str) -> list[Offer]:
     return _fitting([*LINKS, *_devices()], incomplete)
+
+
+def addresses(incomplete: str) -> list[Offer]:
+    """Where viewers may connect."""
+    return _fitting(ADDRESSES, incomplete)
 
 
 def sets(ctx: typer.Context, incomplete: str) -> list[Offer]:

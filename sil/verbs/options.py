@@ -12,12 +12,15 @@ from sil.trouble import UsageError
 from sil.verbs import completion
 
 if TYPE_CHECKING:
+    from sil.live_view import LiveOrder
     from sil.runs import Run
     from sil.scenario import Scenario
 
 KEYS_PANEL = "Keys of the scenario"
 MACHINE_PANEL = "What the machine grants"
 RESULT_PANEL = "Results"
+LIVE_PANEL = "Live view"
+LIVE_AT = "127.0.0.1:8765"  # where viewers look first
 
 ScenarioArgument = Annotated[
     str,
@@ -126,6 +129,38 @@ VerboseOption = Annotated[
     ),
 ]
 
+LiveOption = Annotated[
+    bool,
+    typer.Option(
+        "--live",
+        help="Show the run to Foxglove or Lichtblick while it goes on; the same bytes are logged, the loop waits for "
+        "nobody.",
+        rich_help_panel=LIVE_PANEL,
+    ),
+]
+LiveAtOption = Annotated[
+    str | None,
+    typer.Option(
+        "--live-at",
+        metavar="HOST:PORT",
+        help="Where viewers connect; implies --live. Port 0: any free one, named on stderr. Default: 127.0.0.1:8765.",
+        show_default=False,
+        rich_help_panel=LIVE_PANEL,
+        autocompletion=completion.addresses,
+    ),
+]
+LiveWaitOption = Annotated[
+    float | None,
+    typer.Option(
+        "--live-wait",
+        metavar="S",
+        min=0.0,
+        help="Start when the first viewer is there, or after S seconds; implies --live.",
+        show_default=False,
+        rich_help_panel=LIVE_PANEL,
+    ),
+]
+
 _KEYS = {"clock": "clock.mode", "link": "link.url", "priority": "clock.priority"} | {
     key: key for key in ("variant", "board")
 }
@@ -146,6 +181,23 @@ def cpu_sets(cpus: str | None) -> list[str]:
     if cpus is not None and not known:
         raise UsageError(f"--cpus: expected LAB,BOARD, numbers of CPUs such as 0,1, got {cpus!r}")
     return [f"{key}={part}" for key, part in zip(("clock.lab_cpu", "clock.board_cpu"), parts, strict=False) if part]
+
+
+def live_order(live: bool, at: str | None, wait_s: float | None) -> LiveOrder | None:
+    """What --live, --live-at and --live-wait ask for; None without any of them. Raises UsageError."""
+    from sil.live_view import LiveOrder
+
+    if not live and at is None and wait_s is None:
+        return None
+    return LiveOrder(*address("--live-at", at or LIVE_AT), wait_s or 0.0)
+
+
+def address(option: str, text: str) -> tuple[str, int]:
+    """HOST:PORT or [HOST]:PORT. Raises UsageError."""
+    host, _, port = text.rpartition(":")
+    if not host or not port.isdecimal() or int(port) > 65535:
+        raise UsageError(f"{option}: expected HOST:PORT such as {LIVE_AT}, port 0 to 65535, got {text!r}")
+    return host.removeprefix("[").removesuffix("]"), int(port)
 
 
 def variant_sets(variant: str | None) -> list[str]:

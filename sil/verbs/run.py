@@ -19,6 +19,9 @@ from sil.verbs.options import (
     JsonOption,
     JunitOption,
     LinkOption,
+    LiveAtOption,
+    LiveOption,
+    LiveWaitOption,
     OutOption,
     PriorityOption,
     QuietOption,
@@ -27,12 +30,14 @@ from sil.verbs.options import (
     VariantOption,
     VerboseOption,
     cpu_sets,
+    live_order,
     print_json,
     scenario_from,
     verbosity_of,
 )
 
 if TYPE_CHECKING:
+    from sil.live_view import LiveOrder
     from sil.scenario import Scenario
 
 
@@ -43,6 +48,7 @@ class Told(NamedTuple):
     junit: Path | None
     as_json: bool
     verbosity: int
+    live: LiveOrder | None
 
 
 def run(
@@ -64,6 +70,9 @@ def run(
     variant: VariantOption = None,
     priority: PriorityOption = None,
     cpus: CpusOption = None,
+    live: LiveOption = False,
+    live_at: LiveAtOption = None,
+    live_wait: LiveWaitOption = None,
     out: OutOption = None,
     junit: JunitOption = None,
     as_json: JsonOption = False,
@@ -76,14 +85,15 @@ def run(
     run.mcap (the same bytes for the same scenario and seed), timing.mcap (this machine's part), summary.json, board.log
     and the journal. Verdict and figures on stdout, progress on stderr.
 
-    Ctrl-C or SIGTERM ends the run at the next tick and leaves a complete log and summary.
+    Ctrl-C or SIGTERM ends the run at the next tick and leaves a complete log and summary. With --live (pip install
+    'attitude-sil\\[live]') viewers may look on; `sil live --layout` prints a layout for them.
 
     Exit codes: 0 passed, 1 a requirement failed, 2 usage or invalid scenario, 3 link or board failure or degraded
     timing, 130 interrupted.
 
     Examples: sil run mrac-rs232 | sil run mrac-rs232 --clock scaled:20 --junit results.xml |
     sil run appc-udp --set sensors.attitude.noise_deg=0.02 --out noisy | sil run mrac-rs232 --board cortex-m |
-    sil run pd-root-locus --clock realtime --priority 50 --cpus 0,1
+    sil run pd-root-locus --clock realtime --priority 50 --cpus 0,1 | sil run mrac-rs232 --clock scaled:20 --live
     """
 
     def load() -> Scenario:
@@ -92,7 +102,8 @@ def run(
             scenario, sets, variant=variant, clock=clock, link=link, board=board, priority=_text(priority)
         )
 
-    return _run(scenario, load, Told(out, junit, as_json, verbosity_of(quiet, verbose)), wired=False)
+    told = Told(out, junit, as_json, verbosity_of(quiet, verbose), live_order(live, live_at, live_wait))
+    return _run(scenario, load, told, wired=False)
 
 
 def plant(
@@ -112,6 +123,9 @@ def plant(
     variant: VariantOption = None,
     priority: PriorityOption = None,
     cpus: CpusOption = None,
+    live: LiveOption = False,
+    live_at: LiveAtOption = None,
+    live_wait: LiveWaitOption = None,
     out: OutOption = None,
     junit: JunitOption = None,
     as_json: JsonOption = False,
@@ -134,7 +148,8 @@ def plant(
         sets = [*(set_ or ()), *cpu_sets(cpus)]
         return scenario_from(scenario, sets, variant=variant, clock=clock, link=link, priority=_text(priority))
 
-    return _run(scenario, load, Told(out, junit, as_json, verbosity_of(quiet, verbose)), wired=True)
+    told = Told(out, junit, as_json, verbosity_of(quiet, verbose), live_order(live, live_at, live_wait))
+    return _run(scenario, load, told, wired=True)
 
 
 def board(
@@ -218,7 +233,7 @@ def _run(name: str, load: Callable[[], Scenario], told: Told, wired: bool) -> in
         out = told.out or (Path(scenario.out) if scenario.out else None)
         page.leave_empty(out)
         watch = new_watch(scenario.name, told.verbosity, told.as_json)
-        summary = run_scenario(scenario, out, watch, wired=wired)
+        summary = run_scenario(scenario, out, watch, wired, told.live)
         if summary["failure"]:
             print(summary["failure"], file=sys.stderr)
         if told.as_json:

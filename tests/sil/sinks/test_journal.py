@@ -54,6 +54,20 @@ def test_payloads_round_trip() -> None:
 
 
 @settings(max_examples=60, deadline=None)
+@given(st.lists(st.integers(1, 90), min_size=1, max_size=12))
+def test_who_follows_a_journal_that_grows_by_any_pieces_reads_the_same(tmp_path_factory, pieces: list[int]) -> None:
+    folder = tmp_path_factory.mktemp("grows")
+    whole = written(folder / "whole")
+    (folder / "j").write_bytes(whole[:12])
+    following = read_journal(folder / "j").follow()
+    seen = []
+    for piece in (*pieces, len(whole)):
+        (folder / "j").write_bytes(whole[: (folder / "j").stat().st_size + piece])
+        seen += iter(following.__next__, None)
+    assert seen == list(read_journal(folder / "whole"))
+
+
+@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_any_cut_keeps_whole_records(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     folder = tmp_path_factory.mktemp("cut")

@@ -1,0 +1,153 @@
+"""The process of the live view: `python -m sil.live --host HOST --port PORT`.
+
+It says `listening PORT` on its standard output, then `viewer` when the first one has subscribed. Its standard input is
+the laboratory's: one line names the run directory, and its end, however that comes about, means that nothing more will
+be written: what is in the journal is shown, the connections are closed, and the last line on standard output says in
+JSON what was shown. It never writes to the run directory.
+
+Exit codes: 0 ended as asked, 2 it cannot listen or the library is not installed; then the last line on stderr says why.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import select
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from sil.live.following import MOST_AT_ONCE, Following, Step
+from sil.live.pace import Allowance
+from sil.sinks.journal import JournalError, read_journal
+from sil.sinks.mcap_rows import RunRows, TimingRows
+from sil.trouble import EXIT_OK, EXIT_USAGE
+
+if TYPE_CHECKING:
+    from sil.live.server import Server
+
+LOOK_EVERY_S = 0.02
+TIME_FIRST_S = 0.002  # the time has to be with the viewer before the messages of its tick, by a queue of its own
+DRAINS_S = 0.3  # what is in the queues at the end gets this long to leave
+NICE = 10
+NEEDS = "live view: needs foxglove-sdk: pip install 'attitude-sil[live]'"
+
+
+def main() -> int:
+    """Serve one run."""
+    options = _options()
+    _stay_out_of_the_way(options.cpus)
+    try:
+        from sil.live.server import Server
+    except ImportError as error:
+        return _refuse(f"{NEEDS} ({error})")
+    try:
+        server = Server(options.host, options.port, options.name)
+    except RuntimeError as error:
+        return _refuse(f"live view: cannot listen on {options.host}:{options.port}: {error}")
+    run, timing = RunRows(server), TimingRows(server)  # type: ignore[arg-type]
+    print(f"listening {server.port}", flush=True)
+    folder = sys.stdin.readline().rstrip("\n")
+    if folder:
+        show = Show(server, Following(run, timing))
+        show.all(Path(folder))
+        print(json.dumps(show.summary()), flush=True)
+    server.stop()
+    return EXIT_OK
+
+
+class Show:
+    """One run, from its first record to its last."""
+
+    def __init__(self, server: Server, following: Following) -> None:
+        self._server, self._following = server, following
+        self._allowance = Allowance(time.monotonic())
+        self._ticks = self._shown = 0
+        self._newest: Step | None = None  # which was passed over
+
+    def all(self, folder: Path) -> None:
+        """Until END, or until the laboratory is gone and nothing is left to show."""
+        try:
+            self._following.open(read_journal(folder / "run.journal"))
+        except JournalError:
+            return  # the run was over before it began
+        over = False
+        while True:
+            found = self._round()
+            if over and not found:
+                break
+            if found < MOST_AT_ONCE:
+                over = _pause(LOOK_EVERY_S) or self._following.over
+        if self._server.viewers:
+            time.sleep(DRAINS_S)
+
+    def summary(self) -> dict[str, int | bool]:
+        """What was shown."""
+        return {
+            "ticks": self._ticks,
+            "shown": self._shown,
+            "messages": self._server.messages,
+            "viewers": self._server.viewers,
+            "behind": self._server.behind,
+        }
+
+    def _round(self) -> int:
+        """Show what is new, or what was passed over last where nothing is; how many steps were new."""
+        steps = self._following.new()
+        if not steps and self._newest is not None:
+            self._whole(self._newest)
+        ticks = [step for step in steps if step.is_tick]
+        allowed = iter(self._allowance.of(len(ticks), time.monotonic()))
+        for step in steps:
+            if not step.is_tick or next(allowed):
+                self._whole(step)
+            else:
+                self._newest = step.rest()
+                self._following.show(step.once())
+        self._ticks += len(ticks)
+        self._server.welcome()
+        return len(steps)
+
+    def _whole(self, step: Step) -> None:
+        self._newest = None
+        if step.is_tick:
+            self._shown += 1
+            self._server.time(self._following.time_of(step))
+            time.sleep(TIME_FIRST_S)
+        self._following.show(step)
+
+
+def _pause(seconds: float) -> bool:
+    """Wait; True where standard input has ended."""
+    with suppress(OSError):
+        return bool(select.select([sys.stdin], [], [], seconds)[0])
+    return True
+
+
+def _refuse(line: str) -> int:
+    print(line, file=sys.stderr)
+    return EXIT_USAGE
+
+
+def _options() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m sil.live")
+    parser.add_argument("--host", default="127.0.0.1")
+    parser.add_argument("--port", type=int, default=8765)
+    parser.add_argument("--name", default="attitude-sil")
+    parser.add_argument("--cpus", type=int, nargs="*", default=[])
+    return parser.parse_args()
+
+
+def _stay_out_of_the_way(cpus: list[int]) -> None:
+    """Before the library starts its threads: they inherit it."""
+    with suppress(OSError):
+        os.nice(NICE)
+        if cpus:
+            os.sched_setaffinity(0, cpus)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
