@@ -24,6 +24,7 @@ from sil.verbs import (
     doctor,
     faults,
     ladder,
+    live,
     pil_report,
     replay,
     report,
@@ -76,7 +77,7 @@ def sil(
 
 VERBS: dict[str, tuple[Callable[..., int], ...]] = {
     "Run": (run.run, run.plant, run.board, replay.replay, run.recover),
-    "Look": (report.info, report.report, report.plot, compare.compare, report.export, report.diff),
+    "Look": (report.info, report.report, report.plot, live.live, compare.compare, report.export, report.diff),
     "Study": (ladder.ladder, pil_report.pil_report, sweep.sweep, faults.faults, tables.tables, bench.bench),
     "Prepare": (scenario.scenarios, scenario.check, scenario.schema, doctor.doctor, board_test.board_test),
 }

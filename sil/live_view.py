@@ -37,6 +37,11 @@ class LiveOrder(NamedTuple):
     wait_s: float = 0.0
 
 
+def command_of(host: str, port: int) -> list[str]:
+    """The process that serves viewers there."""
+    return [sys.executable, "-P", "-m", "sil.live", "--host", host, "--port", str(port)]
+
+
 class NoView:
     """A run that nobody asked to see."""
 
@@ -52,11 +57,11 @@ class LiveView(NoView):
     """The process while it lives. Raises UsageError, one line, where it cannot listen as it was asked to."""
 
     def __init__(self, order: LiveOrder, name: str, cpus: set[int]) -> None:
-        command = [sys.executable, "-P", "-m", "sil.live", "--host", order.host, "--port", str(order.port)]
+        command = [*command_of(order.host, order.port), "--elsewhere", "--live-at 127.0.0.1:0 takes any free port"]
         self._errors = tempfile.TemporaryFile()  # noqa: SIM115
         self._said = ""
         self._child = subprocess.Popen(
-            [*command, "--name", f"attitude-sil: {name}", "--cpus", *map(str, sorted(cpus))],
+            [*command, "--name", f"attitude-sil: {name}", "--cpus", ",".join(map(str, sorted(cpus)))],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self._errors,

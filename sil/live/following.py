@@ -14,7 +14,7 @@ from typing import NamedTuple
 from protocol.frames import Type
 from sil.sinks import journal as jn
 from sil.sinks.events import OF_THE_HOST
-from sil.sinks.journal import JournalReader, Kind, Record
+from sil.sinks.journal import Kind, Record
 from sil.sinks.mcap_rows import RunRows, TimingRows
 
 NO_TICK = 0xFFFFFFFF  # of a frame that belongs to its session
@@ -50,9 +50,9 @@ class Following:
         self.period_ns = 0
         self.over = False
 
-    def open(self, reader: JournalReader) -> None:
-        """The journal to follow."""
-        self._records = reader.follow()
+    def follow(self, records: Iterator[Record | None]) -> None:
+        """Whose; None where there is nothing more for now."""
+        self._records = records
 
     def new(self) -> list[Step]:
         """What has become whole since the last call, MOST_AT_ONCE at most: then there may be more."""
