@@ -1,8 +1,8 @@
-"""The live view of a run, from the laboratory's side: a process (sil.live) that is started before the run and asked after.
+"""The live view of a run, from the laboratory's side: a process (sil.live), started before the run and asked after it.
 
-The loop does nothing for it: the process reads run.journal, which is written anyway. What becomes of it never becomes of
-the run: a view that fails is a line at the end. Its standard input is a pipe that only this process holds, so it ends by
-itself whatever ends the laboratory.
+The loop does nothing for it: the process reads run.journal, which is written anyway. A view that fails costs the run
+nothing but a line at the end. Its standard input is a pipe that only this process holds, so it ends by itself whatever
+ends the laboratory.
 """
 
 from __future__ import annotations

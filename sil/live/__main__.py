@@ -56,11 +56,11 @@ def main() -> int:
         return _refuse(f"{options.host}:{options.port}: cannot listen there ({error}); {options.elsewhere}")
     show = Show(server, Following(RunRows(server), TimingRows(server)))  # type: ignore[arg-type]
     try:
-        return _shown(show, Path(options.run), options) if options.run else _told(show)
+        code = _shown(show, Path(options.run), options) if options.run else _told(show)
     except KeyboardInterrupt:
-        return EXIT_INTERRUPTED
-    finally:
-        server.stop()
+        code = EXIT_INTERRUPTED
+    server.stop()
+    return code
 
 
 def _told(show: Show) -> int:
@@ -140,8 +140,8 @@ class Show:
         return len(steps)
 
     def _whole(self, step: Step) -> None:
-        self._newest = None
         if step.is_tick:
+            self._newest = None
             self._shown += 1
             self.server.time(self.following.time_of(step))
             time.sleep(TIME_FIRST_S)
@@ -186,4 +186,6 @@ def _stay_out_of_the_way(cpus: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_code = main()
+    sys.stdout.flush()
+    os._exit(exit_code)  # the library would wait once more for a viewer that is stuck

@@ -1,8 +1,8 @@
 """A journal as it grows, tick by tick, as rows for viewers: the same rows that sil.sinks.seal puts into the log.
 
 A tick is shown when the journal says that it is whole, which is one period after it began. A frame that arrives ticks
-later is shown when it arrives, with the time of its own tick. Of ticks that are not shown, what happened once is: events,
-sessions, CONFIG.
+later is shown when it arrives, with the time of its own tick. Of ticks that are not shown, what happened once is shown
+all the same: events, sessions, CONFIG.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Following:
             return
         self.period_ns = int(content["period_ns"])
         self._run.meta(content)
-        self._run.ends_at(int(content["ticks"]) * self.period_ns)  # as planned: a run that ends sooner says so in its log
+        self._run.ends_at(int(content["ticks"]) * self.period_ns)  # as planned; only the log knows of a sooner end
 
 
 def _of_the_host(record: Record) -> bool:

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import logging
 import sys
+import threading
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
 
 import foxglove
 from foxglove.websocket import Capability, ChannelView, Client, ServerListener
 
 BACKLOG = 1024  # messages a viewer: about two seconds at full rate, 0.3 MB
-KEPT_TOPICS = ("/scene", "/tf")  # whose messages of the first tick are repeated for who comes later
+KEPT_TOPIC = "/scene"  # written when it changes only: the last one is repeated for who comes later
 MOST_ERRORS = 20  # lines about viewers that send nonsense
+CLOSES_S = 1.0  # viewers that read get their goodbye within this time
 VIEWER = "viewer"  # said on stdout when the first one has subscribed to something
 
 
@@ -30,8 +31,8 @@ class Server(ServerListener):
         self._schemas: list[foxglove.Schema] = []
         self._channels: list[foxglove.Channel] = []
         self._topics: dict[str, int] = {}
-        self._kept: dict[str, tuple[int, list[bytes]]] = {}  # log time and messages
-        self._to_repeat: deque[str] = deque(maxlen=1000)  # filled by the library's threads
+        self._kept: tuple[int, bytes] | None = None  # channel and message
+        self._newcomers: deque[int] = deque(maxlen=1000)  # filled by the library's threads
         self._viewers: set[int] = set()  # all that ever subscribed
         self._t_ns = 0
         self.messages = 0
@@ -84,11 +85,8 @@ class Server(ServerListener):
 
     def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
         channel = self._channels[channel_id]
-        topic = channel.topic()
-        if topic in KEPT_TOPICS:
-            first_ns, kept = self._kept.setdefault(topic, (log_time, []))
-            if log_time == first_ns:
-                kept.append(data)
+        if channel.topic() == KEPT_TOPIC:
+            self._kept = channel_id, data
         channel.log(data, log_time=log_time)
         self.messages += 1
 
@@ -107,24 +105,25 @@ class Server(ServerListener):
 
     def welcome(self) -> None:
         """Repeat what was said once, for those who have subscribed since; the others know it already."""
-        topics = set()
-        while self._to_repeat:
-            topics.add(self._to_repeat.popleft())
-        for topic in sorted(topics):
-            for data in self._kept.get(topic, (0, []))[1]:
-                self._channels[self._topics[topic]].log(data, log_time=self._t_ns)
+        if self._newcomers and self._kept is not None:
+            self._newcomers.clear()
+            channel_id, data = self._kept
+            self._channels[channel_id].log(data, log_time=self._t_ns)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         first = not self._viewers
         self._viewers.add(client.id)
-        if channel.topic in KEPT_TOPICS:
-            self._to_repeat.append(channel.topic)
+        if channel.topic == KEPT_TOPIC:
+            self._newcomers.append(client.id)
         if first:
             print(VIEWER, flush=True)
 
     def stop(self) -> None:
-        """Close all connections."""
-        self._server.stop()
+        """Close all connections. The library would wait for a viewer that is stuck until it reads again: we do not, and
+        its threads end with the process."""
+        closing = threading.Thread(target=self._server.stop, daemon=True)
+        closing.start()
+        closing.join(CLOSES_S)
 
 
 class _LibraryLog(logging.Handler):

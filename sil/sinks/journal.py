@@ -319,8 +319,8 @@ class JournalReader:
                 if self.damage:
                     return
                 if not block:
-                    if at < len(data):
-                        self.damage = f"{self.path}: the record at byte {base + at} is cut off after {len(data) - at} bytes"
+                    if (left := len(data) - at) > 0:
+                        self.damage = f"{self.path}: the record at byte {base + at} is cut off after {left} bytes"
                     yield None
 
     def _next(self, data: bytes, at: int, base: int) -> Record | None:

@@ -189,7 +189,7 @@ def live_order(live: bool, at: str | None, wait_s: float | None) -> LiveOrder | 
 
     if not live and at is None and wait_s is None:
         return None
-    return LiveOrder(*address("--live-at", at or LIVE_AT), wait_s or 0.0)
+    return LiveOrder(*address("--live-at", LIVE_AT if at is None else at), wait_s or 0.0)
 
 
 def address(option: str, text: str) -> tuple[str, int]:
