@@ -185,7 +185,8 @@ def _sentence(shown: dict[str, Any]) -> str:
     if "ticks" not in shown:
         return "nothing was shown"
     passed_over = shown["ticks"] - shown["shown"]
-    parts = [f"{shown['viewers']} viewers, {shown['shown']} of {shown['ticks']} ticks shown"]
+    viewers = f"{shown['viewers']} viewer{'s' if shown['viewers'] != 1 else ''}"
+    parts = [f"{viewers}, {shown['shown']} of {shown['ticks']} ticks shown"]
     if passed_over:
         parts.append(f"{passed_over} passed over (at most 50 a second, events all)")
     if shown["behind"]:

@@ -18,7 +18,7 @@ def live(
     run_dir: Annotated[
         Path | None,
         typer.Argument(
-            metavar="[RUN]", help="Directory of a run that goes on, or is over.", autocompletion=completion.runs
+            metavar="RUN", help="Directory of a run that goes on, or is over.", autocompletion=completion.runs
         ),
     ] = None,
     at: Annotated[

@@ -19,8 +19,10 @@ from viewers import Viewer, address_of, stuck, talks_nonsense
 
 from sil.launched import child_environment
 
-SCENARIO = ("mrac-rs232", "--set", "require=[]", "--set", "duration_s=12", "--json", "--out", "run")  # 24 ticks
-PACED = (*SCENARIO, "--clock", "scaled:10")  # 50 ms a tick: a busy machine keeps up
+FLIGHT = ("mrac-rs232", "--set", "require=[]", "--set", "duration_s=12", "--json", "--out", "run")  # 24 ticks
+SCENARIO = (*FLIGHT, "--board", "inproc")  # where the board does not matter: a process less
+CLOCK = ("--clock", "scaled:10")  # 50 ms a tick: a busy machine keeps up
+PACED = (*FLIGHT, *CLOCK)
 ANY = ("--live-at", "127.0.0.1:0")
 SEEN = ("--live-wait", "30", *ANY)
 
@@ -104,7 +106,7 @@ def test_nobody_looks(cli, unseen):
 
 
 def test_a_view_that_is_killed_costs_the_view_and_a_line(cli):
-    process = cli.start("run", *PACED, *SEEN)
+    process = cli.start("run", *SCENARIO, *CLOCK, *SEEN)
     viewer = Viewer(address_of(process))
     assert viewer.has_some.wait(30)
     (view,) = views_of(process)
