@@ -167,14 +167,15 @@ class Flight:
             self._row += 1
 
     def _fill(self, tick: int, sample: Sample | None) -> None:
-        """The law's inputs in wire units; what acts now is the lab's word, without it the board's own last command.
+        """The law's inputs in wire units; what acts now is the lab's word, without it the board's own COMMAND(k - n).
 
+        Of that the law knows what it computed, but not that the watchdog sent zero instead: then it is told.
         Readings and momentum stay as they were while no sample comes.
         """
         wire = self._wire
         wire[inputs.FRESH] = int(sample is not None or self._reused)
         wire[inputs.GOOD_RUN] = self._good_run
-        wire[inputs.APPLIED_KNOWN] = int(sample is not None)
+        wire[inputs.APPLIED_KNOWN] = int(sample is not None or self._watchdog)
         wire[inputs.TICK] = tick
         wire[inputs.SETPOINT] = self._setpoint
         if sample is None:

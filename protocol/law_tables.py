@@ -39,6 +39,7 @@ from protocol.words import (
     ConfigError,
     Word,
     dequantise,
+    in_range,
     lsb_of,
     number_of,
     quantise,
@@ -290,9 +291,8 @@ def _values_in_range(table: LawTable, counts: Mapping[str, int]) -> dict[str, fl
     """Every word as a number; raises for the first outside its range, so before one whose LSB that word says."""
     values: dict[str, float] = {}
     for index, word in enumerate((*COMMON, *table.params)):
-        slack = 0.0 if word.q == 0 and not word.lsb else 1e-9 * (1.0 + abs(word.minimum))  # half an LSB of rounding
         value = dequantise(word, counts[word.name], counts)
-        if not word.minimum - slack <= value <= word.maximum + slack:
+        if not in_range(word, counts[word.name], counts):
             raise ConfigError(f"{word.name}: expected {range_text(word)}, got {value:g}", index=index)
         values[word.name] = value
     return values

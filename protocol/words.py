@@ -62,6 +62,17 @@ def dequantise(word: Word, count: int, words: Mapping[str, int]) -> float:
     return count * lsb_of(word, words)
 
 
+def in_range(word: Word, count: int, words: Mapping[str, int]) -> bool:
+    """Is the word within its range, but for half an LSB of rounding? Zero only where zero is: laws divide by words.
+
+    Twice the value is compared, so that all is exact in 64 bits, and in integers too (firmware/core/config.c).
+    """
+    if (word.q == 0 and not word.lsb) or count == 0:
+        return word.minimum <= count <= word.maximum
+    lsb = lsb_of(word, words)
+    return (2 * count + 1) * lsb >= 2.0 * word.minimum and (2 * count - 1) * lsb <= 2.0 * word.maximum
+
+
 def number_of(word: Word, value: float | str | bool) -> float:
     """The number that a choice's name, a truth value or a number stands for; raises ConfigError for unknown names."""
     if isinstance(value, str):

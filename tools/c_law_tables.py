@@ -1,8 +1,8 @@
 """The tables of the C firmware's laws, from protocol/law_tables.py: indices of words, their ranges, what each allows.
 
-Ranges are integers, exactly equivalent to the check in floating point of parse_configuration(): of a word with a fixed
-number of fractional bits the smallest and largest count; of a word whose bits are another word's value, both bounds as
-mantissa and exponent (of the lower bound its negative, so that both are rounded down).
+Ranges are integers, exactly equivalent to protocol.words.in_range(): of a word with a fixed number of fractional bits
+the smallest and largest count; of a word whose bits are another word's value, both bounds as mantissa and exponent (of
+the lower bound its negative, so that both are rounded down). Half an LSB of rounding is allowed on either side.
 """
 
 from __future__ import annotations
@@ -121,8 +121,9 @@ typedef struct {{
 }} word_range;
 
 /* Range of a word whose fractional bits are the value of CONFIG word bits_word, checked before:
- * count <= floor(high * 2^(high_exponent + bits)) and -count <= floor(minus_low * 2^(low_exponent + bits)).
- * The magnitudes of high and minus_low are 0 or at least 2^52, so an exponent sum of 0 or more is no limit to an int32.
+ * 2 count - 1 <= floor(high * 2^(high_exponent + bits + 1)) and -2 count - 1 <= floor(minus_low * 2^(low_exponent +
+ * bits + 1)), half an LSB beyond it. Zero is within each of these ranges. The magnitudes of high and minus_low are 0
+ * or at least 2^52, so an exponent sum of 0 or more is no limit to an int32.
  */
 typedef struct {{
     int64_t minus_low, high;
@@ -160,16 +161,15 @@ extern const law_table LAW_TABLES[LAW_TABLES_COUNT];
 Scale = tuple[str, float, float]  # word with the bits, lower and upper bound
 
 
-def _bounds(word: Word) -> tuple[float, float]:
-    """What parse_configuration() compares the value with, in the same floating-point operations."""
-    slack = 0.0 if word.q == 0 and not word.lsb else 1e-9 * (1.0 + abs(word.minimum))
-    return word.minimum - slack, word.maximum + slack
-
-
 def _scales() -> list[Scale]:
     """The different (bits, bounds) of words whose LSB another word says."""
     words = [*COMMON, *(word for table in C_LAWS for word in table.params)]
-    return list(dict.fromkeys((word.q, *_bounds(word)) for word in words if isinstance(word.q, str)))
+    return list(dict.fromkeys(_scale(word) for word in words if isinstance(word.q, str)))
+
+
+def _scale(word: Word) -> Scale:
+    assert word.minimum <= 0.0 <= word.maximum, f"{word.name}: config.c takes it that zero is in range"
+    return str(word.q), word.minimum, word.maximum
 
 
 def _scale_table(scales: Sequence[Scale]) -> str:
@@ -219,14 +219,16 @@ def _range_row(words: Sequence[Word], before: Sequence[Word], start: int, scales
 
 def _counts(word: Word, before: Sequence[Word], scales: Sequence[Scale]) -> tuple[int, int, int]:
     """(smallest count, largest count, index of the scale or NO_WORD)."""
-    low, high = _bounds(word)
     if isinstance(word.q, str):
         assert word.q in {known.name for known in before}, f"{word.name}: {word.q} has to come before it"
-        return INT32_MIN, INT32_MAX, scales.index((word.q, low, high))
+        return INT32_MIN, INT32_MAX, scales.index(_scale(word))
     assert not word.lsb, f"{word.name}: an LSB of its own is for users' laws"
-    one = 2**word.q
-    top = INT32_MAX if math.isinf(high) else math.floor(Fraction(high) * one)
-    return max(math.ceil(Fraction(low) * one), INT32_MIN), min(top, INT32_MAX), NO_WORD
+    half = Fraction(1, 2) if word.q else 0
+    top = INT32_MAX if math.isinf(word.maximum) else math.floor(Fraction(word.maximum) * 2**word.q + half)
+    bottom = math.ceil(Fraction(word.minimum) * 2**word.q - half)
+    if bottom == 0 < word.minimum or word.maximum < 0 == top:
+        raise ValueError(f"{word.name}: half an LSB reaches zero, which is out of its range")
+    return max(bottom, INT32_MIN), min(top, INT32_MAX), NO_WORD
 
 
 def _int32(number: int) -> str:

@@ -91,9 +91,10 @@ static bool in_range(int32_t count, const word_range *range, const int32_t *word
         return count >= range->low && count <= range->high;
     }
     const range_scale *scale = &RANGE_SCALES[range->scale];
-    int32_t bits = words[scale->bits_word];
-    return count <= scaled(scale->high, scale->high_exponent + bits) &&
-           -(int64_t)count <= scaled(scale->minus_low, scale->low_exponent + bits);
+    int32_t more = words[scale->bits_word] + 1;
+    int64_t twice = 2 * (int64_t)count;
+    return twice - 1 <= scaled(scale->high, scale->high_exponent + more) &&
+           -twice - 1 <= scaled(scale->minus_low, scale->low_exponent + more);
 }
 
 /* Index of the first word outside its range, or NO_INDEX. */

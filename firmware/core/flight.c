@@ -134,13 +134,14 @@ static void take_setpoint(flight *f, uint32_t tick, const sample *s) {
     }
 }
 
-/* The law's inputs; what acts now is the laboratory's word, without it the board's own COMMAND(k - n). Readings and momentum
- * stay as they were while no sample comes. */
+/* The law's inputs; what acts now is the laboratory's word, without it the board's own COMMAND(k - n). Of that the law knows
+ * what it computed, but not that the watchdog sent zero instead: then it is told. Readings and momentum stay as they were
+ * while no sample comes. */
 static void fill(flight *f, uint32_t tick, const sample *s) {
     law_input *in = &f->in;
     int32_t delay = f->common[COMMON_TRANSPORT_DELAY_TICKS];
     in->fresh = s != NULL || f->reused;
-    in->applied_known = s != NULL;
+    in->applied_known = s != NULL || f->watchdog;
     in->good_run = f->good_run;
     in->tick = tick;
     memcpy(in->setpoint, f->setpoint, sizeof in->setpoint);
@@ -161,7 +162,7 @@ static void fill(flight *f, uint32_t tick, const sample *s) {
     }
 }
 
-/* u clipped to [-limit, limit]; a limit of -1, which the words' rounding allows, gives 1. */
+/* u clipped to [-limit, limit]. */
 static int32_t limited(int32_t u, int32_t limit) {
     int32_t low = u < limit ? u : limit;
     return low > -limit ? low : -limit;

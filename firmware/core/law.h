@@ -16,7 +16,7 @@
 typedef struct law_input {
     int32_t fresh;         /* 1: this tick's reading is there and used (or, by `stale: reuse`, an old one passed for it) */
     int32_t good_run;      /* readings used in a row, this one included */
-    int32_t applied_known; /* 1: applied is the laboratory's word for what acts from t_k on */
+    int32_t applied_known; /* 1: applied is the laboratory's word for what acts from t_k on, or the watchdog's zero */
     int32_t euler[3];      /* 2^-32 turn */
     int32_t quaternion[4]; /* 2^-30, scalar first */
     int32_t rate[3];       /* 2^-rate_bits rad/s, body axes */

@@ -14,7 +14,7 @@ import numpy as np
 
 FRESH = 0  # 1: this tick's reading is there and used (or, by `stale: reuse`, an old one passed for it)
 GOOD_RUN = 1  # readings used in a row, this one included
-APPLIED_KNOWN = 2  # 1: APPLIED is the laboratory's word for what acts from t_k on, after all limits
+APPLIED_KNOWN = 2  # 1: APPLIED is the laboratory's word for what acts from t_k on, or the watchdog's zero
 EULER = slice(3, 6)  # 2^-32 turn | rad
 QUATERNION = slice(6, 10)  # 2^-30 | 1, scalar first
 RATE = slice(10, 13)  # 2^-rate_bits | rad/s, body axes

@@ -11,7 +11,7 @@ from firmware_sim.controllers.user import load_user_law
 from firmware_sim.flight import Flight
 from protocol import events, frames
 from protocol.frames import Command, Event, Reading, Sample
-from protocol.law_tables import config_words
+from protocol.law_tables import config_words, law_by_name
 
 DIARY = """
 class Law:
@@ -65,6 +65,23 @@ def test_without_a_sample_the_boards_own_command_of_n_ticks_ago_acts(tmp_path: P
     flown.step(6, None)
     source = 6 - max(delay, 1)
     assert law.diary[-1] == (6, pytest.approx(0.001 * (source + 1)))
+
+
+@pytest.mark.parametrize(
+    ("law", "form", "field", "place"),
+    [("appc", "fixed", "applied", 0), ("appc", "float", "applied", 0), ("mrac", "fixed", "input", 0),
+     ("mrac", "float", "input", 0), ("predictor", "float", "sent", 1)],
+)  # fmt: skip
+def test_a_model_takes_the_watchdogs_zero_for_what_acts(law: str, form: str, field: str, place: int) -> None:
+    """SPEC B5: a law that went on with its own command came back from an outage with twice the error."""
+    mask = 5 if law == "predictor" else 1
+    flown = Flight(config_words(law_by_name(law), {"form": form, "link_limit": 3, "readings_mask": mask}))
+    away = (Reading(0, (2**26, 2**26, 2**26)), None, Reading(0, (0, 0, 0)))
+    for tick in range(40):
+        flown.step(tick, sample(tick)._replace(readings=away, valid=5, setpoint=(0, 0, 0)))
+    torques = [command(flown.step(tick, None)).torque for tick in range(40, 46)]
+    assert all(torques[0]) and torques[2:] == [(0, 0, 0)] * 4
+    assert flown._law.field(field)[place] == 0
 
 
 @pytest.mark.parametrize("form", ["fixed", "float"])

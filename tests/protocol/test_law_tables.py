@@ -78,6 +78,12 @@ def test_a_choice_by_name_and_its_defaults() -> None:
     assert parse_configuration(config_words(MRAC, {"design": "printed", "c2_pole": 0.5})).values["c2_pole"] == 0.5
 
 
+def test_the_ends_of_a_range_survive_their_rounding_and_zero_does_not_become_one() -> None:
+    assert parse_configuration(config_words(APPC, {"inertia_kgm2": 0.05})).values["inertia_kgm2_x"] < 0.05
+    with pytest.raises(ConfigError, match=r"inertia_kgm2_x: expected 1e-06 to 1e\+06 kg m\^2, got 0"):
+        parse_configuration(config_words(law_by_name("predictor"), {"inertia_bits": 0, "inertia_kgm2": 0.4}))
+
+
 def test_no_limit() -> None:
     configuration = parse_configuration(config_words(PD, {"torque_limit": (0.1, math.inf, 0.1)}))
     assert configuration.common["torque_limit_y"] == NO_LIMIT and configuration.values["torque_limit_y"] == math.inf

@@ -3,15 +3,15 @@
 #include "law_tables.h"
 
 const range_scale RANGE_SCALES[] = {
-    {4835703278458517, 4503599627370496, -82, 0, 10}, /* torque_bits: -1e-09 to inf */
-    {8589934600589943, 8589934600589943, -33, -33, 26}, /* kp_bits: -1000000.001 to 1000000.001 */
-    {8589934600589943, 8589934600589943, -33, -33, 27}, /* kd_bits: -1000000.001 to 1000000.001 */
-    {4835703278458517, 8589934592000009, -82, -33, 26}, /* ka_bits: -1e-09 to 1000000 */
-    {8589934600589943, 8589934600589943, -33, -33, 33}, /* axis_gain_bits: -1000000.001 to 1000000.001 */
-    {8796093031012889, 8796093031012889, -43, -43, 29}, /* A_bits: -1000.000001 to 1000.000001 */
-    {8589934600589943, 8589934600589943, -33, -33, 30}, /* B_bits: -1000000.001 to 1000000.001 */
-    {8589934600589943, 8589934600589943, -33, -33, 31}, /* C_bits: -1000000.001 to 1000000.001 */
-    {8589934600589943, 8589934600589943, -33, -33, 32}, /* D_bits: -1000000.001 to 1000000.001 */
+    {0, 4503599627370496, -53, 0, 10}, /* torque_bits: 0 to inf */
+    {8589934592000000, 8589934592000000, -33, -33, 26}, /* kp_bits: -1000000 to 1000000 */
+    {8589934592000000, 8589934592000000, -33, -33, 27}, /* kd_bits: -1000000 to 1000000 */
+    {0, 8589934592000000, -53, -33, 26}, /* ka_bits: 0 to 1000000 */
+    {8589934592000000, 8589934592000000, -33, -33, 33}, /* axis_gain_bits: -1000000 to 1000000 */
+    {8796093022208000, 8796093022208000, -43, -43, 29}, /* A_bits: -1000 to 1000 */
+    {8589934592000000, 8589934592000000, -33, -33, 30}, /* B_bits: -1000000 to 1000000 */
+    {8589934592000000, 8589934592000000, -33, -33, 31}, /* C_bits: -1000000 to 1000000 */
+    {8589934592000000, 8589934592000000, -33, -33, 32}, /* D_bits: -1000000 to 1000000 */
 };
 
 const word_range COMMON_RANGES[COMMON_WORDS] = {
@@ -34,7 +34,7 @@ const word_range COMMON_RANGES[COMMON_WORDS] = {
     {INT32_MIN, INT32_MAX, 0}, /* torque_limit_z */
     {0, 2, NO_WORD}, /* reference_kind */
     {1, 2, NO_WORD}, /* reference_lead */
-    {-1, 1073741825, NO_WORD}, /* reference_pole */
+    {0, 1073741824, NO_WORD}, /* reference_pole */
     {0, INT32_MAX, NO_WORD}, /* rate_limit */
     {0, INT32_MAX, NO_WORD}, /* accel_limit */
     {0, 1, NO_WORD}, /* setpoint_source */
@@ -58,33 +58,33 @@ static const word_range PD_RANGES[PD_WORDS] = {
 
 static const word_range MRAC_RANGES[MRAC_WORDS] = {
     {0, 1, NO_WORD}, /* design */
-    {-1, 1072668083, NO_WORD}, /* c2_pole */
-    {-1, 1073741825, NO_WORD}, /* kappa */
-    {966367640, 1073741826, NO_WORD}, /* forgetting */
+    {0, 1072668082, NO_WORD}, /* c2_pole */
+    {0, 1073741824, NO_WORD}, /* kappa */
+    {966367642, 1073741824, NO_WORD}, /* forgetting */
     {1048576, INT32_MAX, NO_WORD}, /* trace_max */
     {105, 104857600, NO_WORD}, /* F0 */
     {0, 1, NO_WORD}, /* decouple */
     {0, 1, NO_WORD}, /* identify */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_x */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_y */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_z */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b0_x */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b0_y */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b0_z */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b1_x */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b1_y */
-    {-2136746232, 2136746232, NO_WORD}, /* printed_b1_z */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_x */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_y */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_z */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b0_x */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b0_y */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b0_z */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b1_x */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b1_y */
+    {-2136746230, 2136746230, NO_WORD}, /* printed_b1_z */
 };
 
 static const word_range APPC_RANGES[APPC_WORDS] = {
-    {-1, 1063004406, NO_WORD}, /* controller_pole */
-    {-1, 1063004406, NO_WORD}, /* observer_pole */
+    {0, 1063004406, NO_WORD}, /* controller_pole */
+    {0, 1063004406, NO_WORD}, /* observer_pole */
     {0, 1, NO_WORD}, /* adapt */
     {0, 1, NO_WORD}, /* gyro */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_x */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_y */
-    {3355444, 2013265920, NO_WORD}, /* inertia_kgm2_z */
-    {-274, 1924145623, NO_WORD}, /* orbit_rate_radps */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_x */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_y */
+    {3355443, 2013265920, NO_WORD}, /* inertia_kgm2_z */
+    {0, 1924145349, NO_WORD}, /* orbit_rate_radps */
     {0, 1, NO_WORD}, /* recover_torque */
 };
 

@@ -530,8 +530,9 @@ typedef struct {
 } word_range;
 
 /* Range of a word whose fractional bits are the value of CONFIG word bits_word, checked before:
- * count <= floor(high * 2^(high_exponent + bits)) and -count <= floor(minus_low * 2^(low_exponent + bits)).
- * The magnitudes of high and minus_low are 0 or at least 2^52, so an exponent sum of 0 or more is no limit to an int32.
+ * 2 count - 1 <= floor(high * 2^(high_exponent + bits + 1)) and -2 count - 1 <= floor(minus_low * 2^(low_exponent +
+ * bits + 1)), half an LSB beyond it. Zero is within each of these ranges. The magnitudes of high and minus_low are 0
+ * or at least 2^52, so an exponent sum of 0 or more is no limit to an int32.
  */
 typedef struct {
     int64_t minus_low, high;

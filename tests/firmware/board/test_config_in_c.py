@@ -86,12 +86,11 @@ def test_each_word_at_and_beyond_its_limits(c_board: CBoard, table: LawTable) ->
 def _edges(word: Word, exponent: int) -> set[int]:
     """Counts around the limits of a word, as far as an int32 goes."""
     q = exponent if isinstance(word.q, str) else word.q
-    slack = 0.0 if word.q == 0 else 1e-9 * (1.0 + abs(word.minimum))
     edges = {-INT32_MAX - 1, -1, 0, 1, INT32_MAX}
-    for bound in (word.minimum - slack, word.maximum + slack):
+    for bound in (word.minimum, word.maximum):
         if math.isfinite(bound):
             count = math.floor(Fraction(bound) * 2**q)
-            edges |= {count - 1, count, count + 1, count + 2}
+            edges |= {count + step for step in (-2, -1, 0, 1, 2)}
     return {count for count in edges if -INT32_MAX - 1 <= count <= INT32_MAX}
 
 

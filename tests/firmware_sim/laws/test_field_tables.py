@@ -35,7 +35,7 @@ CORNERS = {
     ],
     "appc": [
         {"period_us": 200_000, "inertia_kgm2": 30.0, "controller_pole": 0, "observer_pole": 0},
-        {"period_us": 1_000_000, "inertia_kgm2": 0.0500001, "controller_pole": 0.99, "orbit_rate_radps": 0.007},
+        {"period_us": 1_000_000, "inertia_kgm2": 0.05, "controller_pole": 0.99, "orbit_rate_radps": 0.007},
     ],
 }
 CORNERS["vsc"] = [
