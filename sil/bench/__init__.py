@@ -16,4 +16,5 @@ BENCHES: dict[str, str] = {
     "lockstep": "sil.bench.lockstep:Lockstep",
     "wakeup": "sil.bench.wakeup:Wakeup",
     "fast": "sil.bench.fast:FastLoop",
+    "live": "sil.bench.live:LiveView",
 }

@@ -77,10 +77,10 @@ class Paced(NamedTuple):
     lateness_us: list[float]
 
 
-def paced(file: Path, folder: Path, keys: Sequence[str], wall_s: float) -> Paced:
+def paced(file: Path, folder: Path, keys: Sequence[str], wall_s: float, options: Sequence[str] = ()) -> Paced:
     """`sil run FILE` in a process of its own, as a user starts it. Raises ChildFailed, also for a run cut short."""
     sets = [part for key in keys for part in ("--set", key)]
-    command = sil_command("run", str(file), "--out", str(folder), "--json", *sets)
+    command = sil_command("run", str(file), "--out", str(folder), "--json", *sets, *options)
     said = run_child(command, wall_s + START_S, EXIT_CODES, child_environment())
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -15,7 +15,7 @@ def bench(
         list[str] | None,
         typer.Argument(
             metavar="NAMES",
-            help="codec, recorder, law, plant, loop, boards, lockstep, wakeup, fast. Default: all of them.",
+            help="codec, recorder, law, plant, loop, boards, lockstep, wakeup, fast, live. Default: all.",
         ),
     ] = None,
     repeats: Annotated[
@@ -23,15 +23,16 @@ def bench(
         typer.Option("--repeats", metavar="N", min=1, max=1000, help="Interleaved repeats; default 5, quick 2."),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Short ones, in about three minutes: to see that all of it works here.")
+        bool, typer.Option("--quick", help="Short ones, in about four minutes: to see that all of it works here.")
     ] = False,
     as_json: JsonOption = False,
 ) -> int:
     """Measure this machine: ratios to something run beside us in the same minutes, medians and spreads.
 
     lockstep: against a bare ping-pong on a pty. boards: the firmware, native and emulated, against the Python board.
-    wakeup, fast: against cyclictest (Debian package rt-tests), else a small C loop. plant, loop: against Basilisk (pip
-    install 'attitude-sil\\[bench]'). codec, recorder, law: against the least that anybody would have to do.
+    wakeup, fast: against cyclictest (Debian package rt-tests), else a small C loop. live: a run that viewers look at
+    against one that nobody does. plant, loop: against Basilisk (pip install 'attitude-sil\\[bench]'). codec, recorder,
+    law: against the least that anybody would have to do.
 
     All of it takes about half an hour; Ctrl-C prints what is finished. Close other programs first: the machine's load
     is in the table.

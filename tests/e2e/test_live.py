@@ -197,12 +197,16 @@ os._exit(0)
 
 
 def test_memory_is_bounded_however_long_a_viewer_is_stuck():
-    """66 MB are published; what the queue and the kernel hold of it is there after the first 6 MB."""
+    """66 MB are published; what the queue and the kernel hold of it is there after the first 6 MB. The viewer is that
+    of `sil bench live`."""
     environment = {**child_environment(), "PYTHONUNBUFFERED": "1"}
     command = [sys.executable, "-P", "-c", FLOOD]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment, cwd=REPO) as process:
-        with stuck(("127.0.0.1", int(process.stdout.readline().split()[-1]))):
+        port = process.stdout.readline().strip()
+        onlooker = [sys.executable, "-P", "-m", "sil.bench.onlooker", port, "stuck"]
+        with subprocess.Popen(onlooker, env=environment) as viewer:
             *_, line = process.stdout.read().splitlines()  # until it has ended
+            viewer.kill()
         assert process.wait(30) == 0
     early_kB, late_kB, behind = map(int, line.split())
     assert late_kB - early_kB < 3000 and behind == 1
