@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from protocol import law_tables
 from protocol.frames import Command, Config, Reading, Sample, Telemetry
-from protocol.law_tables import COMMON, LAWS, TELEMETRY_COMMON, Word
+from protocol.law_tables import COMMON, LAWS, REFERENCE_NONE, TELEMETRY_COMMON, Word
 from sil.sinks import layouts
 
 DEG_PER_BAM = 360.0 / 2**32
@@ -19,7 +19,9 @@ _NAN3 = (float("nan"),) * 3
 _NAN4 = (float("nan"),) * 4
 _NO_AGE = 0xFFFFFFFF
 _BITS = ("torque_bits", "momentum_bits", "rate_bits")
-_BITS_AT = {name: [word.name for word in COMMON].index(name) for name in _BITS}
+_NAMES = [word.name for word in COMMON]
+_BITS_AT = {name: _NAMES.index(name) for name in _BITS}
+_REFERENCE_AT = [_NAMES.index(name) for name in ("reference_kind", "rate_limit", "telemetry_every")]
 
 
 class TelemetryTable(NamedTuple):
@@ -42,6 +44,8 @@ class Decoder:
 
     def __init__(self) -> None:
         self.words: dict[int, int] = {}
+        self.follows_setpoint = False  # the board has no reference model that differs from the set-point
+        self.tells_reference = False  # it has that, or reports its reference in TELEMETRY
         self._law = ""
         self._table: TelemetryTable | None = None
         self._take_bits()
@@ -55,6 +59,9 @@ class Decoder:
         """One part of CONFIG."""
         self.words.update(enumerate(frame.words, frame.offset))
         self._take_bits()
+        kind, limit, every = (self.words.get(index) for index in _REFERENCE_AT)
+        self.follows_setpoint = (kind, limit) == (REFERENCE_NONE, 0)
+        self.tells_reference = self.follows_setpoint or bool(every)
 
     def named_words(self) -> dict[str, int | list[int]]:
         """COMMON's words by name, and all words in order under `words`."""

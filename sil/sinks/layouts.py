@@ -248,6 +248,54 @@ class HousekeepingLayout:
 HOUSEKEEPING = HousekeepingLayout()
 
 
+class JointStateLayout:
+    """sensor_msgs/msg/JointState of the same joints all along: the message that viewers know joints by.
+
+    Positions are never known, velocities of all joints or of none: as the message wants it, its arrays are then empty.
+    """
+
+    name = "sensor_msgs/msg/JointState"
+    schema = (
+        b"# Wheels as joints about the body axes. Arrays are empty where nothing is known.\n"
+        b"std_msgs/Header header  # stamp: simulation time; frame_id: body\n"
+        b"string[] name  # wheel_x, wheel_y, wheel_z\n"
+        b"float64[] position  # rad: empty\n"
+        b"float64[] velocity  # relative to the body, rad/s: empty without spin inertia, NaN of one wheel without\n"
+        b"float64[] effort  # motor torque on the wheel, N m\n"
+        + b"=" * 80
+        + b"\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
+        + b"=" * 80
+        + b"\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
+    )
+
+    def __init__(self, names: Sequence[str] = (), with_velocity: bool = True) -> None:
+        known = len(names) if with_velocity else 0
+        frame = _aligned(b"", "body") + struct.pack("<I", len(names))
+        self._between = _aligned(frame, *names) + struct.pack("<II", 0, known)  # no positions, then the velocities
+        self._count = len(names)
+        at = struct.calcsize(self._format(0, 0)) - len(CDR_HEADER)
+        first = -at % 8 if known else 0
+        second = -(at + first + 8 * known + 4) % 8
+        self._struct = struct.Struct(self._format(first, second, known))
+
+    def pack(self, t_ns: int, velocity: Sequence[float], effort: Sequence[float]) -> bytes:
+        """The CDR bytes of one message; `velocity` is empty where the layout is without."""
+        seconds, nanos = divmod(t_ns, 1_000_000_000)
+        return self._struct.pack(CDR_HEADER, seconds, nanos, self._between, *velocity, self._count, *effort)
+
+    def _format(self, first: int, second: int, known: int | None = None) -> str:
+        head = f"<4siI{len(self._between)}s"
+        return head if known is None else f"{head}{first}x{known}dI{second}x{self._count}d"
+
+
+def _aligned(before: bytes, *texts: str) -> bytes:
+    """`before` and after it these strings, each up to a multiple of four."""
+    for text in texts:
+        data = text.encode("ascii") + b"\0"
+        before += struct.pack("<I", len(data)) + data + bytes(-len(data) % 4)
+    return before
+
+
 def telemetry(law: str, words: Sequence[tuple[str, str]]) -> Layout:
     """The TELEMETRY layout of one law: a float64 per word, given as (name, unit), then tick, law and fate."""
     fields = [Field("float64", _ros_name(name), 1, unit or "1") for name, unit in words]

@@ -13,11 +13,15 @@ from typing import Any
 from mcap.writer import Writer
 
 from protocol import frames
+from protocol.events import REFERENCE_RESTART
 from protocol.frames import Type
+from sil.pointing import Quaternion
 from sil.sinks import events, layouts, viewer
 from sil.sinks import journal as jn
 from sil.sinks.decoding import DEG_PER_BAM, Decoder
+from sil.sinks.frames import BODY, INERTIAL, ORBITAL, REFERENCE, Frames
 from sil.sinks.journal import Direction, Fate, Kind, PacketRecord, Record
+from sil.sinks.scene import Parts, scene
 
 _DEG = 180.0 / math.pi
 _TYPE_AT, _SEQUENCE_AT, _TICK_AT = 1, slice(2, 4), slice(4, 8)
@@ -39,12 +43,10 @@ class RunRows:
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
         self._decoder = Decoder()
-        self._transforms = viewer.Transforms()
         self._channels = _register(writer, _FIXED_TOPICS)
-        for topic, (name, descriptors) in viewer.schemas().items():
-            schema = writer.register_schema(name, viewer.SCHEMA_ENCODING, descriptors)
-            self._channels[topic] = writer.register_channel(topic, viewer.ENCODING, schema)
-        self._scene_sent = False
+        for topic in ("/tf", "/scene", "/log"):
+            self._channels[topic] = _register_viewers(writer, topic)
+        self._sees(None)
         self._sessions = 0
         self._end_ns: int | None = None  # what arrives then or later is in flight
         self.fates: Counter[tuple[int, int, str, bool]] = Counter()  # of copies: direction, fate, cause, a further one
@@ -57,6 +59,7 @@ class RunRows:
         """META: metadata `run`, and the resolved scenario as an attachment."""
         rest = {key: value for key, value in content.items() if key != "scenario"}
         self._decoder.describe(content)
+        self._sees(content.get("scenario"))
         self._writer.add_metadata("run", _texts(rest))
         if "scenario" in content:
             text = json.dumps(content["scenario"], indent=2, sort_keys=True, ensure_ascii=False) + "\n"
@@ -79,11 +82,13 @@ class RunRows:
             if record.kind == Kind.SESSION:
                 self._add("/session", tick, t_ns, layouts.SESSION.pack(tick, self._sessions))
                 self._sessions += 1
+                self._frames.session()
         for _, copies in groupby(map(self._at_the_end, packets), key=_frame_order):
             self._copies(tick, t_ns, list(copies))
         for record in records:
             if record.kind == Kind.TRUTH:
                 self._truth(tick, t_ns, jn.read_truth(record.payload))
+        self._late_reference(tick, t_ns)
         for code, a, b in sorted(jn.read_event(record.payload) for record in records if record.kind == Kind.LAB_EVENT):
             self._event(tick, t_ns, 0, code, a, b)
 
@@ -94,14 +99,60 @@ class RunRows:
         degrees = (x * _DEG, y * _DEG, z * _DEG, *applied, rx * DEG_PER_BAM, ry * DEG_PER_BAM, rz * DEG_PER_BAM)
         row = layouts.TRUTH.pack(*q, *w, *h, *euler, *degrees, tick, source)
         self._add("/truth", tick, t_ns, row)
-        self._add("/tf", tick, t_ns, self._transforms.pack(t_ns, q))
-        if not self._scene_sent:
-            self._add("/scene", tick, t_ns, viewer.scene(t_ns))
-            self._scene_sent = True
+        self._add("/tf", tick, t_ns, self._transforms.pack(t_ns, self._turns(t_ns, truth)))
+        if self._wheels is not None:
+            self._add("/joint_states", tick, t_ns, self._wheels.pack(t_ns, h, w, applied))
+        if self._parts() != self._shown:
+            self._add("/scene", tick, t_ns, self.scene(t_ns))
+            self._shown = self._parts()
 
     def ends_at(self, end_ns: int) -> None:
         """The run is over at end_ns; the ticks that follow here are its last ones."""
         self._end_ns = end_ns
+
+    # -- for viewers ---------------------------------------------------------------------------------------------
+
+    def scene(self, t_ns: int) -> bytes:
+        """The message /scene as it is now; for viewers that come later it may be sent again at any time."""
+        return scene(t_ns, self._parts())
+
+    def _sees(self, scenario: Mapping[str, Any] | None) -> None:
+        """What viewers are shown of this scenario; None: nothing is known of it."""
+        self._frames = Frames(scenario)
+        parents = {ORBITAL: INERTIAL, BODY: INERTIAL, REFERENCE: self._frames.parent_of_reference}
+        self._transforms = viewer.Transforms(parents)
+        self._wheels = viewer.wheels_of(scenario)
+        if self._wheels is not None:
+            self._channels.update(_register(self._writer, [("/joint_states", layouts.JointStateLayout)]))
+        self._reported: tuple[int, ...] | None = None  # TELEMETRY's words of this tick
+        self._shown: Parts | None = None  # in the last /scene
+
+    def _parts(self) -> Parts:
+        known = self._frames.orbital_is_known
+        return Parts(self._wheels is not None, known and self._decoder.tells_reference, known)
+
+    def _turns(self, t_ns: int, truth: jn.Truth) -> dict[str, Quaternion]:
+        """The rotations of a tick by frame."""
+        turns = {BODY: self._frames.body(truth)}
+        if (orbital := self._frames.orbital(t_ns, truth)) is not None:
+            turns[ORBITAL] = orbital
+        if (reference := self._reference()) is not None:
+            turns[REFERENCE] = reference
+        elif self._decoder.follows_setpoint and (setpoint := self._frames.pointed(truth.setpoint_bam)) is not None:
+            turns[REFERENCE] = setpoint
+        return turns
+
+    def _reference(self) -> Quaternion | None:
+        """The reference that was reported since the last call."""
+        words, self._reported = self._reported, None
+        return None if words is None else self._frames.reported(words)
+
+    def _late_reference(self, tick: int, t_ns: int) -> None:
+        """A TELEMETRY that came without its tick's truth, in a live view: a transform of its own."""
+        if (reference := self._reference()) is not None:
+            self._add("/tf", tick, t_ns, self._transforms.pack(t_ns, {REFERENCE: reference}))
+
+    # -- frames --------------------------------------------------------------------------------------------------
 
     def _at_the_end(self, record: PacketRecord) -> PacketRecord:
         """What would have arrived once the run was over is in flight, in time or not."""
@@ -145,6 +196,8 @@ class RunRows:
         elif type_ == Type.TELEMETRY:
             self._telemetry(sequence, t_ns, frame, fate)
         elif type_ == Type.EVENT:
+            if frame.code == REFERENCE_RESTART:
+                self._frames.reference_begins()
             self._event(tick, t_ns, 1, frame.code, frame.a, frame.b)
         elif type_ == Type.CONFIG:
             self._decoder.config(frame)
@@ -157,6 +210,7 @@ class RunRows:
             metadata = {"law": table.law, "names": json.dumps(names), "units": units}
             self._channels.update(_register(self._writer, [("/telemetry", table.layout)], metadata))
         self._add("/telemetry", sequence, t_ns, table.pack(frame, fate))
+        self._reported = frame.words
 
     def _event(self, tick: int, t_ns: int, origin: int, code: int, a: int, b: int) -> None:
         level, text = events.describe(code, a, b)
@@ -198,6 +252,7 @@ class TimingRows:
             ("/housekeeping/down", layouts.HOUSEKEEPING),
         )
         self._channels = _register(writer, topics)
+        self._channels["/log"] = _register_viewers(writer, "/log")
         self.answers_ns = array("q")  # SAMPLE to COMMAND, of every tick whose answer came
 
     def host(self, content: Mapping[str, Any]) -> None:
@@ -210,6 +265,8 @@ class TimingRows:
             if record.kind == Kind.LAB_EVENT:
                 code, a, b = jn.read_event(record.payload)
                 data, topic = layouts.EVENT.pack(tick, a, b, code, 0), "/event"
+                text = viewer.log(t_ns, events.level_of(code), "host", events.describe(code, a, b)[1])
+                self._writer.add_message(self._channels["/log"], t_ns, text, t_ns, tick)
             elif record.kind == Kind.TIMING:
                 *times_ns, cause = timing = jn.read_timing(record.payload)
                 data, topic = layouts.TIMING.pack(*times_ns, tick, cause), "/timing"
@@ -242,6 +299,14 @@ def _register(writer: Writer, topics: Any, metadata: dict[str, str] | None = Non
             ids[layout.name] = writer.register_schema(layout.name, layouts.SCHEMA_ENCODING, layout.schema)
         channels[topic] = writer.register_channel(topic, layouts.ENCODING, ids[layout.name], metadata or {})
     return channels
+
+
+def _register_viewers(writer: Writer, topic: str) -> int:
+    """A channel of one of the foxglove schemas."""
+    name, descriptors = viewer.schema_of(topic)
+    schema = writer.register_schema(name, viewer.SCHEMA_ENCODING, descriptors)
+    channel: int = writer.register_channel(topic, viewer.ENCODING, schema)
+    return channel
 
 
 def _texts(content: Mapping[str, Any]) -> dict[str, str]:

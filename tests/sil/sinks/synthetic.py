@@ -19,6 +19,7 @@ from sil.sinks.journal import Direction, Fate, Journal, Kind
 PERIOD_NS = 500_000_000
 PERIOD_S = 0.5
 INERTIA = (2.13, 3.04, 3.09)
+WHEEL_INERTIA = [0.002, 0.003, 0.0]  # of the third one only the momentum is known
 START_DEG = (10.0, 10.0, 5.0)
 TURN = 2.0 * math.pi
 BAM_RAD = TURN / 2**32
@@ -48,6 +49,8 @@ def meta(ticks: int) -> dict[str, object]:
         "period_s": PERIOD_S,
         "transport_delay_ticks": 1,
         "law": {"name": "pd"},
+        "attitude": {"sequence": 321, "frame": "lvlh"},
+        "actuators": {"kind": "wheels", "wheels": {"inertia_kgm2": WHEEL_INERTIA}},
         "metrics": {"from_tick": 20},
         "require": [{"metric": "rms_error_deg.roll", "below": 30.0}],
     }
