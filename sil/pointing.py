@@ -62,8 +62,9 @@ def q_of_euler(euler_rad: Sequence[float], sequence: int) -> Quaternion:
 
 def q_columns(euler_deg: Array, sequence: int) -> Array:
     """(N, 4) of angles [phi, theta, psi] (N, 3) deg, sign continuous; NaN gives NaN."""
-    half = np.radians(euler_deg) / 2.0
-    q = np.column_stack(_q_of_halves(*np.cos(half).T, *np.sin(half).T, 1.0 if sequence == 321 else -1.0))
+    half = np.radians(euler_deg).T / 2.0
+    (cx, cy, cz), (sx, sy, sz) = np.cos(half), np.sin(half)
+    q = np.column_stack(_q_of_halves(cx, cy, cz, sx, sy, sz, 1.0 if sequence == 321 else -1.0))
     flips = np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1.0, 1.0)
     return np.asarray(q * np.concatenate(([1.0], np.cumprod(flips)))[: len(q), None])
 

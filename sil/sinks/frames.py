@@ -26,13 +26,18 @@ _RAD_PER_BAM = 2.0 * math.pi / 2**32
 
 
 class Frames:
-    """Rotations by frame, sign continuous in time; without a scenario there is only the body's."""
+    """Rotations by frame, sign continuous in time; without a scenario there is only the body's.
+
+    Raises AttributeError, TypeError, ValueError or ArithmeticError for a scenario that makes no sense.
+    """
 
     def __init__(self, scenario: Mapping[str, Any] | None) -> None:
         self._known = scenario is not None
         self._sequence = pointing.sequence_of(scenario or {})
         self._lvlh = pointing.frame_of(scenario or {}) == "lvlh"
         self._orbit = pointing.orbit_of(scenario or {})
+        if not (math.isfinite(self._orbit.u_rad(1.0)) and math.isfinite(self._orbit.tilt_rad)):
+            raise ValueError(f"plant.orbit: expected numbers, got {self._orbit}")
         self._before: dict[str, Quaternion] = {}
         self._running = False  # the board's reference model
 

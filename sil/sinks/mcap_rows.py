@@ -47,6 +47,8 @@ class RunRows:
         for topic in ("/tf", "/scene", "/log"):
             self._channels[topic] = _register_viewers(writer, topic)
         self._sees(None)
+        self._reported: tuple[int, ...] | None = None  # TELEMETRY's words of this tick
+        self._shown: Parts | None = None  # in the last /scene
         self._sessions = 0
         self._end_ns: int | None = None  # what arrives then or later is in flight
         self.fates: Counter[tuple[int, int, str, bool]] = Counter()  # of copies: direction, fate, cause, a further one
@@ -117,15 +119,15 @@ class RunRows:
         return scene(t_ns, self._parts())
 
     def _sees(self, scenario: Mapping[str, Any] | None) -> None:
-        """What viewers are shown of this scenario; None: nothing is known of it."""
-        self._frames = Frames(scenario)
+        """What viewers are shown of this scenario; None: nothing is known of it, as of one that makes no sense."""
+        try:
+            self._frames, self._wheels = Frames(scenario), viewer.wheels_of(scenario)
+        except (AttributeError, TypeError, ValueError, ArithmeticError):  # whoever opens the log is told
+            self._frames, self._wheels = Frames(None), None
         parents = {ORBITAL: INERTIAL, BODY: INERTIAL, REFERENCE: self._frames.parent_of_reference}
         self._transforms = viewer.Transforms(parents)
-        self._wheels = viewer.wheels_of(scenario)
         if self._wheels is not None:
             self._channels.update(_register(self._writer, [("/joint_states", layouts.JointStateLayout)]))
-        self._reported: tuple[int, ...] | None = None  # TELEMETRY's words of this tick
-        self._shown: Parts | None = None  # in the last /scene
 
     def _parts(self) -> Parts:
         known = self._frames.orbital_is_known

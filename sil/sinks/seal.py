@@ -1,17 +1,15 @@
 """run.mcap and timing.mcap from run.journal. run.mcap is a pure function of the journal: same records, same bytes.
 
 Only simulation time stands in run.mcap: log_time = publish_time = t_k = tick * period_ns. Order: tick by tick; within
-a tick sessions, packets by (direction, type, sequence), each followed by its decoded form, then truth, /tf and events.
-Never arrival order, so clock, link and process boundaries leave no trace.
+a tick sessions, packets by (direction, type, sequence), each followed by its decoded form, then truth, /tf,
+/joint_states, /scene and events. Never arrival order, so clock, link and process boundaries leave no trace.
 
-What the bytes depend on besides the journal: this file, layouts.py, viewer.py; the protobuf descriptors of the
-installed foxglove-schemas-protobuf; the `lz4` library's compressor (its output for given input changes rarely between
-releases, which is why it is preferred to zstd); and the record layout of the `mcap` writer, whose library string is
-replaced by a fixed one. The versions used are written to timing.mcap.
+What the bytes depend on besides the journal: the files of this folder and sil/pointing.py; the protobuf descriptors of
+the installed foxglove-schemas-protobuf; the `lz4` library's compressor (its output for given input changes rarely
+between releases, which is why it is preferred to zstd); and the record layout of the `mcap` writer, whose library
+string is replaced by a fixed one. The versions used are written to timing.mcap.
 
-run.mcap: /session /packet/up /packet/down /sample /command /telemetry /truth /event (CDR), /tf /scene /log (protobuf),
-metadata `run` (META) and `end` (END), attachment `scenario.json`. timing.mcap: /timing, /housekeeping/up|down,
-metadata `host`.
+Every topic with its fields: docs/reference/topics.md.
 """
 
 from __future__ import annotations

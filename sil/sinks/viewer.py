@@ -75,11 +75,15 @@ class Wheels:
 
 
 def wheels_of(scenario: Mapping[str, Any] | None) -> Wheels | None:
-    """The wheels of a resolved scenario; None: it has thrusters, or nothing is known of it."""
+    """The wheels of a resolved scenario; None: it has thrusters, or nothing is known of it.
+
+    Raises AttributeError, TypeError or ValueError for a scenario that makes no sense.
+    """
     actuators = (scenario or {}).get("actuators") or {}
     if actuators.get("kind") != "wheels":
         return None
-    return Wheels((actuators.get("wheels") or {}).get("inertia_kgm2") or (0.0, 0.0, 0.0))
+    x, y, z = map(float, (actuators.get("wheels") or {}).get("inertia_kgm2") or (0.0, 0.0, 0.0))
+    return Wheels((x, y, z))
 
 
 def log(t_ns: int, level: str, origin: str, text: str) -> bytes:

@@ -97,6 +97,27 @@ def test_what_nobody_knows_is_neither_a_frame_nor_in_the_scene(
     assert {entity.frame_id for entity in feed.sheet.of("/scene")[0].entities} == set(frames)
 
 
+@pytest.mark.parametrize(
+    "nonsense",
+    [
+        "a text",
+        {"attitude": "a text"},
+        {"attitude": {"sequence": "yaw first"}},
+        {"plant": {"orbit": {"radius_m": 0.0}}},
+        {"plant": {"orbit": {"mu": -1.0}}},
+        {"plant": {"orbit": {"u0_deg": math.nan}}},
+        {"actuators": {"kind": "wheels", "wheels": {"inertia_kgm2": [1.0]}}},
+    ],
+)
+def test_a_scenario_that_makes_no_sense_is_as_good_as_none(nonsense: object) -> None:
+    """The log is made all the same; that it makes no sense is said to whoever opens it."""
+    feed = Feed()
+    feed.rows.meta({"scenario": nonsense})
+    feed.tick(0, *configured(), feed.telemetry(0, (0, 0, 0)), feed.begins(0), truth(0))
+    assert list(feed.transforms()[0]) == ["body"]
+    assert not feed.sheet.of("/joint_states")
+
+
 def test_signs_are_continuous() -> None:
     """Half a turn about x on one side and the other: q and -q are the same attitude, between them nothing jumps."""
     feed = Feed()
