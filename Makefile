@@ -34,7 +34,7 @@ test: $(VENV)/.installed tests/e2e/node_modules/.installed
 
 # The site, in build/docs: open build/docs/index.html
 docs: $(VENV)/.installed
-	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --doctree-dir build/doctrees docs build/docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet --fresh-env --write-all --doctree-dir build/doctrees docs build/docs
 
 # The documents' pictures, of runs that it makes: some minutes, and a Chromium for those of the report.
 pictures: $(VENV)/.installed

@@ -126,7 +126,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     for name in PLAIN:
         app.add_lexer(name, TextLexer)
     app.add_transform(InTheDark)
-    app.connect("env-get-outdated", lambda *_: ["index"])  # it lists files that may be new
     app.connect("source-read", of_elsewhere)
     app.connect("source-read", in_order)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
