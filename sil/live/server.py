@@ -9,6 +9,7 @@ from __future__ import annotations
 import logging
 import sys
 import threading
+import time
 from collections import deque
 from collections.abc import Mapping
 
@@ -18,6 +19,7 @@ from foxglove.websocket import Capability, ChannelView, Client, ServerListener
 BACKLOG = 1024  # messages a viewer: about two seconds at full rate, 0.3 MB
 KEPT_TOPIC = "/scene"  # written when it changes only: the last one is repeated for who comes later
 MOST_ERRORS = 20  # lines about viewers that send nonsense
+SUBSCRIBES_S = 0.3
 CLOSES_S = 1.0  # viewers that read get their goodbye within this time
 VIEWER = "viewer"  # said on stdout when the first one has subscribed to something
 
@@ -34,6 +36,7 @@ class Server(ServerListener):
         self._kept: tuple[int, bytes] | None = None  # channel and message
         self._newcomers: deque[int] = deque(maxlen=1000)  # filled by the library's threads
         self._viewers: set[int] = set()  # all that ever subscribed
+        self._wanted: set[str] = set()  # topics that anybody ever subscribed to
         self._t_ns = 0
         self.messages = 0
         self._server = foxglove.start_server(
@@ -81,7 +84,14 @@ class Server(ServerListener):
                 context=self._context,
             )
             self._channels.append(channel)
+            self._let_subscribe(topic)
         return self._topics[topic]
+
+    def _let_subscribe(self, topic: str) -> None:
+        """A channel that is new while somebody looks has its first message soon: let them ask for it before."""
+        give_up = time.monotonic() + SUBSCRIBES_S
+        while self._viewers and topic not in self._wanted and time.monotonic() < give_up:
+            time.sleep(0.005)
 
     def add_message(self, channel_id: int, log_time: int, data: bytes, publish_time: int, sequence: int = 0) -> None:
         channel = self._channels[channel_id]
@@ -113,6 +123,7 @@ class Server(ServerListener):
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
         first = not self._viewers
         self._viewers.add(client.id)
+        self._wanted.add(channel.topic)
         if channel.topic == KEPT_TOPIC:
             self._newcomers.append(client.id)
         if first:
