@@ -70,13 +70,21 @@ def signals_of(run: Run) -> dict[str, Signal]:
         Signal("momentum", "momentum", "N m s", "Wheel momentum", lambda run: run.momentum_Nms, zero=True),
         Signal("rate", "rate", "deg/s", "Body rate ω_BN", lambda run: np.degrees(run.omega_radps), zero=True),
     ]
-    if not controlled(run):
-        found.pop(1)
     signals = {signal.name: signal for signal in found}
+    if not controlled(run):
+        del signals["error"]
+    if without_wheels(run):
+        del signals["momentum"]
     signals |= {name: _reported(run, name) for name in _reported_names(run)}
     if _timing_file(run).exists():
         signals |= {signal.name: signal for signal in _TIMES[: 2 if controlled(run) else 1]}
     return signals
+
+
+def without_wheels(run: Run) -> bool:
+    """Thrusters turn it, and no wheel has any momentum."""
+    kind = (run.scenario.get("actuators") or {}).get("kind", "wheels")
+    return bool(kind != "wheels" and not run.momentum_Nms.any())
 
 
 def identified(run: Run) -> list[str]:

@@ -8,6 +8,7 @@ give the same bytes.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -68,9 +69,10 @@ def page(runs: Sequence[Run], stage: Stage = lambda _: None) -> str:
     scripts = [licence + _asset("vendor/uPlot.LICENSE") + "*/\n" + uplot]
     scripts += [f"// {name}.js\n{_asset(f'{name}.js')}" for name in SCRIPTS]
     style = "\n".join((_asset("vendor/uPlot.min.css"), _colours(), _asset("page.css")))
-    text = _asset("page.html").replace("{{STYLE}}", style).replace("{{SCRIPTS}}", "\n".join(scripts))
     title = " / ".join(labels(runs)[:3]).replace("&", "&amp;").replace("<", "&lt;")
-    return text.replace("{{TITLE}}", title).replace("{{DATA}}", _json(content(runs, stage)))
+    title = title.encode("utf-8", "replace").decode("utf-8")
+    parts = {"STYLE": style, "SCRIPTS": "\n".join(scripts), "TITLE": title, "DATA": _json(content(runs, stage))}
+    return re.sub(r"{{(\w+)}}", lambda place: parts[place[1]], _asset("page.html"))
 
 
 def content(runs: Sequence[Run], stage: Stage = lambda _: None) -> dict[str, Any]:
@@ -124,8 +126,9 @@ def _asset(name: str) -> str:
 
 
 def _json(made: Any) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return json.dumps(made, allow_nan=False, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    """JSON that cannot end the script element it stands in; a path's bytes that are no UTF-8 are escaped."""
+    text = json.dumps(made, allow_nan=False, separators=(",", ":"), ensure_ascii=False).replace("<", "\\u003c")
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def _colours() -> str:

@@ -15,9 +15,12 @@ from sil.metrics import NEVER_SETTLED, SETTLING, judge, measure
 from sil.plain import flat, plain
 from sil.report.facts import law_of
 from sil.report.page.link import between
+from sil.report.signals import controlled, without_wheels
 from sil.runs import Run
 
 MOST_EVENTS = 400  # of a run, evenly by code: what is left out is counted
+MOST_MARKS = 500  # places under the slider at which something happened
+_OF_A_LAW = ("rms_error_deg", "peak_error_deg", "rms_setpoint_error_deg", "settling_s")  # nobody follows without
 _METRICS = (
     ("rms_error_deg", "rms error to reference", "deg", 1.0),
     ("peak_error_deg", "peak error to reference", "deg", 1.0),
@@ -48,7 +51,7 @@ def summary(run: Run, label: str) -> dict[str, Any]:
         "period_s": run.period_s,
         "end_s": float(run.t_s[-1]) + run.period_s,
         "require": _required(run, metrics),
-        "metrics": _metrics(metrics),
+        "metrics": _metrics(run, metrics),
         "events": _events(run),
         "spans": _spans(run),
         "identity": _identity(run),
@@ -65,7 +68,7 @@ def differences(runs: Sequence[Run]) -> list[list[str]]:
 
 
 def _facts(run: Run) -> list[list[str]]:
-    delay = run.scenario.get("transport_delay_ticks")
+    delay = run.scenario.get("transport_delay_ticks") if controlled(run) else None
     return [
         [key, text]
         for key, text in (
@@ -94,12 +97,14 @@ def _required(run: Run, metrics: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _metrics(metrics: Mapping[str, Any]) -> list[list[Any]]:
+def _metrics(run: Run, metrics: Mapping[str, Any]) -> list[list[Any]]:
     """[[name, unit, [roll, pitch, yaw]], ...]; numbers without axes are repeated in none of them."""
     rows: list[list[Any]] = []
+    unsaid = () if controlled(run) else _OF_A_LAW
+    unsaid += ("peak_momentum_Nms",) if without_wheels(run) else ()
     for name, words, unit, factor in _METRICS:
         values = metrics.get(name)
-        if isinstance(values, list | tuple):
+        if isinstance(values, list | tuple) and name not in unsaid:
             rows.append([words, unit, [_metric(name, value, factor) for value in values]])
     diverged = metrics.get("diverged_at_s")
     if diverged is not None:
@@ -120,7 +125,7 @@ def _number(value: Any) -> str:
 
 
 def _events(run: Run) -> dict[str, Any]:
-    """Counts of all, and rows of the first ones of each code, in order."""
+    """Counts of all, rows of the first ones of each code, in order, and the times of all but references, thinned."""
     counts: dict[int, int] = {}
     rows, codes = [], {event.code for event in run.events}
     each = max(1, MOST_EVENTS // max(1, len(codes)))
@@ -129,7 +134,10 @@ def _events(run: Run) -> dict[str, Any]:
         if counts[event.code] <= each:
             name = name_of(event.code)
             rows.append([event.t_s, event.origin, name, event.text.removeprefix(f"{name}: ")])
-    return {"counts": [[name_of(code), count] for code, count in sorted(counts.items())], "rows": rows}
+    width_s = len(run) * run.period_s / MOST_MARKS
+    bins = {int((event.t_s - run.t_s[0]) / width_s) for event in run.events if event.code != events.REFERENCE_RESTART}
+    marks = [float(run.t_s[0]) + each * width_s for each in sorted(bins)]
+    return {"counts": [[name_of(code), count] for code, count in sorted(counts.items())], "rows": rows, "marks": marks}
 
 
 def _spans(run: Run) -> list[dict[str, Any]]:

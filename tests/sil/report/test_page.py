@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
+import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -19,7 +21,9 @@ from sil.cli import invoke
 from sil.report.page import ASSETS, MOST_RUNS, SCRIPTS, ReportError, content, default_out, page, report
 from sil.report.page.attitudes import directions
 from sil.report.page.columns import extremes, spans
-from sil.runs import Run, open_run
+from sil.runner import run_scenario
+from sil.runs import EventRow, Run, open_run
+from sil.scenario import load_scenario
 from sil.sinks.seal import seal
 from tools import vendored
 
@@ -88,6 +92,30 @@ def test_the_same_run_gives_the_same_bytes(run: Run, tmp_path: Path) -> None:
     assert report([run], tmp_path / "a.html").read_bytes() == report([run], tmp_path / "b.html").read_bytes()
 
 
+def test_the_marks_of_events_reach_farther_than_their_list(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    many = [EventRow(tick, tick * 0.5, code, "board", 0, 0, "") for tick in range(300) for code in (2, 3, 7)]
+    monkeypatch.setitem(run.__dict__, "events", many)
+    events = content([run])["runs"][0]["events"]
+    assert max(row[0] for row in events["rows"]) < 80.0
+    assert events["marks"][0] == 0.0 and events["marks"][-1] >= 149.0
+    assert sum(count for _, count in events["counts"]) == 900
+
+
+def test_without_a_law_or_a_wheel_nothing_is_said_of_them(folder: Path) -> None:
+    """An error to a reference that nobody follows, a momentum that nobody has."""
+    run_scenario(load_scenario("rigid-open-loop", ["duration_s=5"]), folder / "open")
+    sets = ["duration_s=0.2", "board=inproc", "link.url=inproc"]
+    run_scenario(load_scenario("delay-picosat", sets), folder / "thrusters")
+    said = {}
+    for name in ("open", "thrusters"):
+        made = content([open_run(folder / name)])
+        of_run = made["runs"][0]
+        said[name] = {row[0] for row in (*of_run["metrics"], *of_run["facts"])} | {plot["id"] for plot in made["plots"]}
+    assert {"momentum", "peak wheel momentum"} <= said["open"] and "rms torque" in said["thrusters"]
+    assert not {"rms error to reference", "settling", "error", "transport delay"} & said["open"]
+    assert not {"momentum", "peak wheel momentum"} & said["thrusters"]
+
+
 def test_nothing_in_the_data_can_end_the_script(run: Run) -> None:
     run.scenario["about"] = "</script><script>alert(1)</script>"
     try:
@@ -97,6 +125,15 @@ def test_nothing_in_the_data_can_end_the_script(run: Run) -> None:
     assert "<script>alert" not in text
     data = text.partition('id="data">')[2].partition("</script>")[0]
     assert json.loads(data)["runs"][0]["about"].startswith("</script>")
+
+
+def test_a_path_that_is_no_text_can_be_reported(folder: Path, run: Run) -> None:
+    odd = folder / os.fsdecode(b"\xff{{DATA}}")
+    shutil.copytree(run.directory, odd)
+    text = report([open_run(odd)], folder / "odd.html").read_text()
+    assert text.count('"made_by"') == 1
+    data = text.partition('id="data">')[2].partition("</script>")[0]
+    assert json.loads(data)["runs"][0]["path"] == str(odd / "run.mcap")
 
 
 def test_nothing_points_outside(run: Run) -> None:

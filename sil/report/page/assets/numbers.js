@@ -36,7 +36,7 @@ SIL.before = (times, t) => {
 SIL.number = (value, digits = 4) => {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(digits - 2).replace("-", "−");
+  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(digits - 2).replaceAll("-", "−");
   const places = size === 0 ? 0 : Math.max(0, Math.min(6, digits - 1 - Math.floor(Math.log10(size))));
   return value.toFixed(places).replace("-", "−");
 };

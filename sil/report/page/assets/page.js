@@ -22,10 +22,14 @@
   function repaint() { SIL.forgetColours(); SIL.redrawCharts(); scene?.redraw(); if (several && scene) show(SIL.shown()); }
   const unzoom = el("button", { type: "button", id: "unzoom", class: "plain", hidden: true, onclick: () => SIL.zoomTo(null) }, "whole time");
   const header = el("header", {},
-    el("div", { class: "title" }, el("h1", {}, several ? `${runs.length} runs compared` : runs[0].label, several ? null : SIL.badge(runs[0].verdict)),
+    el("div", { class: "title" }, el("h1", {}, several ? `${runs.length} runs compared` : runs[0].label, several ? tally() : SIL.badge(runs[0].verdict)),
       el("div", { class: "buttons" }, unzoom, theme, el("button", { type: "button", class: "plain", onclick: () => window.print() }, "print"))),
-    several ? null : [runs[0].about ? el("p", { class: "about" }, runs[0].about) : null, facts(runs[0])],
+    several ? null : [SIL.inShort(runs[0]), runs[0].about ? el("p", { class: "about" }, runs[0].about) : null, facts(runs[0])],
     runs.filter((run) => run.failure).map((run) => el("p", { class: "failure" }, several ? `${run.label}: ` : "", run.failure)));
+  function tally() {
+    const verdicts = [...new Set(runs.map((run) => run.verdict))];
+    return verdicts.map((verdict) => SIL.badge(verdict, `${runs.filter((run) => run.verdict === verdict).length} ${verdict}`));
+  }
   function facts(run) { return el("dl", { class: "facts" }, run.facts.map(([key, value]) => el("div", {}, el("dt", {}, key), el("dd", {}, value)))); }
 
   // -- stage: view and player ------------------------------------------------------------------------------------

@@ -68,7 +68,6 @@ SIL.player = (onTime) => {
 
 // Where events are, under the slider.
 function marks(first, last) {
-  const all = SIL.data.runs.flatMap((run) => run.events.rows).filter(([, , name]) => name !== "REFERENCE_RESTART").slice(0, 400);
-  const lines = all.map(([t]) => SIL.el("svg:rect", { x: ((t - first) / (last - first)) * 1000, y: 0, width: 2, height: 6, class: "fill warn" }));
+  const lines = SIL.data.runs.flatMap((run) => run.events.marks).map((t) => SIL.el("svg:rect", { x: ((t - first) / (last - first)) * 1000, y: 0, width: 2, height: 6, class: "fill warn" }));
   return SIL.el("svg:svg", { class: "marks", viewBox: "0 0 1000 6", preserveAspectRatio: "none", "aria-hidden": "true" }, lines);
 }

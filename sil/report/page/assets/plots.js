@@ -43,6 +43,7 @@ function legendOf(plot) {
   };
   const head = SIL.el("tr", {}, SIL.el("td"), plot.roles.map(([name, style]) => SIL.el("th", { scope: "col" }, sample(null, 0, style), name)));
   const body = plot.rows.map((name, row) => {
+    if (!plot.lines[row].some(Boolean)) return null; // a run that does not tell this
     const toggle = SIL.el("button", { type: "button", class: "row", "aria-pressed": "true", title: `hide or show ${name}`, onclick() {
       hidden.has(row) ? hidden.delete(row) : hidden.add(row);
       toggle.setAttribute("aria-pressed", String(!hidden.has(row)));
@@ -74,7 +75,7 @@ function drawn(run, name, plot) {
   const values = Array.from(SIL.column(run, name), (value) => (Number.isNaN(value) ? null : value));
   if (plot.angle && SIL.data.runs[run].data.bin === 1)
     for (let i = values.length - 1; i > 0; i--)
-      if (values[i] !== null && values[i - 1] !== null && Math.abs(values[i] - values[i - 1]) > 180) values[i] = null;
+      if (values[i] !== null && values[i - 1] !== null && Math.abs(values[i] - values[i - 1]) > 180) values[i] = values[i - 1] = null;
   return values;
 }
 
@@ -106,7 +107,7 @@ function makeChart(chart) {
     lines[at - 1] = {
       stroke: colour, width: style.width, alpha: style.alpha ?? 1, show: !legend.hidden.has(row),
       dash: style.dash ?? (plot.of === "runs" ? DASHES[Math.floor(row / 7)] : undefined),
-      points: { show: false }, spanGaps: !plot.angle, paths: plot.step ? uPlot.paths.stepped({ align: 1 }) : undefined,
+      points: { show: data[0].length < 3 }, spanGaps: !plot.angle, paths: plot.step ? uPlot.paths.stepped({ align: 1 }) : undefined,
     };
   }));
   const faint = SIL.css("--faint"), grid = { stroke: SIL.css("--grid"), width: 1 }, font = "12px system-ui, sans-serif";
@@ -129,7 +130,11 @@ function makeChart(chart) {
   chart.show(SIL.shown());
 }
 
-const plain = (value) => (value === null ? "" : String(parseFloat(value.toPrecision(7))).replace("-", "−"));
+const plain = (value) => {
+  if (value === null) return "";
+  const size = Math.abs(value), short = parseFloat(value.toPrecision(7));
+  return (size !== 0 && (size < 1e-4 || size >= 1e6) ? short.toExponential() : String(short)).replaceAll("-", "−");
+};
 function roomy(low, high, plot) {
   if (low === null || high === null) return [-1, 1];
   if (plot.zero && low === 0 && high === 0) return [-1, 1];

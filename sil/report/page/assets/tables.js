@@ -1,10 +1,19 @@
 // What is not drawn over time: verdict, requirements, metrics, fates, strips, histograms, registers, events, identity.
 const { el } = SIL;
 
-SIL.badge = (verdict) => {
+SIL.badge = (verdict, text = verdict) => {
   const kind = { passed: "good", failed: "bad", degraded: "warn", interrupted: "warn" }[verdict] ?? "calm";
   const mark = { good: "✓", bad: "✗", warn: "!", calm: "?" }[kind];
-  return el("span", { class: `badge ${kind}` }, el("span", { "aria-hidden": "true" }, mark), verdict);
+  return el("span", { class: `badge ${kind}` }, el("span", { "aria-hidden": "true" }, mark), text);
+};
+
+// The requirements in one line, the failed ones by name: what a phone shows first.
+SIL.inShort = (run) => {
+  const failed = run.require.filter((line) => !line.passed), all = run.require.length;
+  if (!all) return null;
+  const named = failed.slice(0, 3).map((line) => `${line.requirement}, got ${line.got}`.replace(/(^|[\s,])-(?=\d)/g, "$1−"));
+  const text = failed.length ? `${failed.length} of ${all} requirement${all > 1 ? "s" : ""} failed` : all > 1 ? `All ${all} requirements met` : "The one requirement is met";
+  return el("p", { class: "short" }, el("a", { href: "#requirements", class: failed.length ? "bad" : "" }, text), failed.length ? `: ${named.join("; ")}${failed.length > 3 ? "; …" : ""}` : null);
 };
 
 const table = (head, rows, properties = {}) => el("div", { class: "scroll" }, el("table", properties,
