@@ -156,7 +156,7 @@ def live_view(order: LiveOrder | None, scenario: Scenario, watch: Watch) -> Iter
         return
     view = LiveView(order, scenario.name, _cpus(scenario))
     try:
-        watch.note(f"live: {view.url}  (Foxglove, Lichtblick: open connection; layout: sil live --layout)")
+        watch.note(f"live: {view.url} for Foxglove or Lichtblick; layout: sil live --layout")
         if not scenario.clock_scale:
             watch.note("live: lockstep is over before one has looked; --clock scaled:20 shows every tick")
         if order.wait_s:
