@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from sil.report.colours import LIGHT
+from sil.report.colours import DARK, LIGHT, Look
 from sil.report.look import finish
 from tools.browser import Browser, program
 from tools.pictures import loop, terminal
@@ -40,12 +40,11 @@ class Studio:
         if done.returncode > 1:
             raise OSError(f"sil {' '.join(words)}: {done.stderr.decode().strip()}")
 
-    def run(self, scenario: str, *more: str) -> str:
+    def run(self, scenario: str) -> str:
         """The directory of a run of this scenario."""
-        name = "-".join([scenario, *(word.rpartition("=")[2] for word in more if not word.startswith("-"))])
-        if not (self.folder / name).exists():
-            self.sil("run", scenario, *more, "--out", name)
-        return name
+        if not (self.folder / scenario).exists():
+            self.sil("run", scenario, "--out", scenario)
+        return scenario
 
     def file(self, name: str, *words: str) -> bytes:
         """What a command writes to the file `name`."""
@@ -58,14 +57,17 @@ class Studio:
         return terminal.drawn(shown, terminal.after_the_view(text)).encode()
 
     def live(self) -> bytes:
-        """The view of a paced run in its middle; of one without a real miss, if this machine lets it."""
-        shown = "sil run mrac-rs232 --clock scaled:20 --priority 50"
+        """The view of a paced run about its middle; before its first real miss, if this machine makes one."""
+        shown, view = "sil run mrac-rs232 --clock scaled:20 --priority 50", ""
         for _ in range(TRIES):
             shutil.rmtree(self.folder / "live", ignore_errors=True)
             text = terminal.seen([*terminal.SIL, *shown.split()[1:], "--out", "live"], self.folder, (100, 30))
-            if "not reproducible" not in text and "degraded" not in text:
+            frames = terminal.frames(text)
+            calm = [each for each in frames if "real misses 0 " in terminal.plain(each)]
+            view = calm[min(len(calm), int(0.55 * len(frames))) - 1]
+            if len(calm) > 0.35 * len(frames):
                 break
-        return terminal.drawn(shown, terminal.frame(text, 0.55)).encode()
+        return terminal.drawn(shown, view).encode()
 
     def page(self, width: int, height: int, dark: bool = False) -> bytes:
         """The report of a run in a browser, in mid-turn."""
@@ -90,35 +92,37 @@ def small(png: bytes, width: int = 0) -> bytes:
     return out.getvalue()
 
 
-def plotted(*runs: str, options: Sequence[str] = ()) -> Callable[[Studio], bytes]:
-    """The picture that `sil plot` makes of runs of these scenarios."""
+def plotted(name: str, *runs: str, options: Sequence[str] = ()) -> dict[str, Callable[[Studio], bytes]]:
+    """The pictures that `sil plot` makes of runs of these scenarios, for light and for dark paper."""
 
-    def make(studio: Studio) -> bytes:
-        folders = [studio.run(*run.split()) for run in runs]
-        return small(studio.file("plot.png", "plot", *folders, *options, "--out", "plot.png"))
+    def make(studio: Studio, *more: str) -> bytes:
+        folders = [studio.run(run) for run in runs]
+        return small(studio.file("plot.png", "plot", *folders, *options, *more, "--out", "plot.png"))
 
-    return make
+    return {f"{name}.png": make, f"{name}-dark.png": lambda studio: make(studio, "--dark")}
 
 
-def delays(studio: Studio) -> bytes:
+def delays(studio: Studio, look: Look = LIGHT) -> bytes:
     """Rms attitude error over the last 20 s against the delay of the sensors, law by law."""
-    vary = (f"variant={','.join(LAWS)}", f"law.params.error={','.join(ERRORS)}", f"sensors.sampling.delay_s={DELAYS}")
-    studio.sil("sweep", "delay-comparison", *(word for each in vary for word in ("--vary", each)), "--out", "delays")
+    if not (studio.folder / "delays").exists():
+        keys = {"variant": LAWS, "law.params.error": ERRORS, "sensors.sampling.delay_s": (DELAYS,)}
+        vary = (word for key, values in keys.items() for word in ("--vary", f"{key}={','.join(values)}"))
+        studio.sil("sweep", "delay-comparison", *vary, "--out", "delays")
     with (studio.folder / "delays" / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    figure = Figure(figsize=(12, 4.6), dpi=100, facecolor=LIGHT.paper)
+    figure = Figure(figsize=(12, 4.6), dpi=100, facecolor=look.paper)
     FigureCanvasAgg(figure)
     for ax, (error, title) in zip(figure.subplots(1, 2, sharey=True), ERRORS.items(), strict=True):
-        for (law, name), colour in zip(LAWS.items(), LIGHT.runs, strict=False):
+        for (law, name), colour in zip(LAWS.items(), look.runs, strict=False):
             mine = [row for row in rows if (row["variant"], row["law.params.error"]) == (law, error)]
             delay = [float(row["sensors.sampling.delay_s"]) for row in mine]
             residual = [float(row["residual_error_deg.all"] or "nan") for row in mine]
             ax.plot(delay, np.maximum(residual, 0.01), "o-", ms=4, lw=1.6, color=colour, label=name)
         ax.set_yscale("log")
-        ax.axhline(LOST_deg, color=LIGHT.faint, lw=1, ls="--")
-        finish(ax, "rms of the last 20 s" if error == "euler" else "", "deg" if error == "euler" else "", title, LIGHT)
-        ax.set_xlabel("delay of the sensors in s", fontsize=11, color=LIGHT.ink)
-    figure.axes[0].legend(frameon=False, fontsize=10, loc="lower right")
+        ax.axhline(LOST_deg, color=look.faint, lw=1, ls="--")
+        finish(ax, "rms of the last 20 s" if error == "euler" else "", "deg" if error == "euler" else "", title, look)
+        ax.set_xlabel("delay of the sensors in s", fontsize=11, color=look.ink)
+    figure.axes[0].legend(frameon=False, fontsize=10, loc="lower right", labelcolor=look.ink)
     figure.tight_layout()
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=100)
@@ -156,13 +160,14 @@ PICTURES: dict[str, Callable[[Studio], bytes]] = {
     "info.svg": screens_after_a_run("sil info runs/mrac-rs232-001"),
     "ladder.svg": screens_after_a_run("sil ladder mrac-rs232", 132),
     "sweep.svg": screens_after_a_run(SWEEP, 100),
-    "plot.png": plotted("mrac-rs232"),
+    **plotted("plot", "mrac-rs232"),
     "report.png": lambda studio: small(studio.page(1400, 900)),
     "report-dark.png": lambda studio: small(studio.page(1400, 900, dark=True)),
     "report-phone.png": lambda studio: small(studio.page(390, 844), 585),
-    "compare.png": plotted("appc-rs232", "mrac-rs232", options=("--signals", "error,torque", "--time", "100:300")),
-    "adaptive.png": plotted("mrac-as-printed", "pd-root-locus", "mrac-rs232", options=("--signals", "attitude,torque")),
+    **plotted("compare", "appc-rs232", "mrac-rs232", options=("--signals", "error,torque", "--time", "100:300")),
+    **plotted("adaptive", "mrac-as-printed", "pd-root-locus", "mrac-rs232", options=("--signals", "attitude,torque")),
     "margin-map.png": margins,
     "delays.png": delays,
+    "delays-dark.png": lambda studio: delays(studio, DARK),
     "design.png": designed,
 }

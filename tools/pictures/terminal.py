@@ -65,11 +65,15 @@ def seen(command: Sequence[str], folder: Path, size: tuple[int, int] = SIZE) -> 
     return data.decode()
 
 
-def frame(text: str, share: float) -> str:
-    """One view out of many: that at `share` of the way through the run."""
-    frames = re.findall(re.escape(BEGIN_FRAME) + "(.*?)" + re.escape(END_FRAME), text, re.DOTALL)
-    whole = [each for each in frames if "wake-up late" in each]
-    return whole[int(share * (len(whole) - 1))]
+def frames(text: str) -> list[str]:
+    """Every whole view that was drawn, in order."""
+    drawn = re.findall(re.escape(BEGIN_FRAME) + "(.*?)" + re.escape(END_FRAME), text, re.DOTALL)
+    return [each for each in drawn if "wake-up late" in each]
+
+
+def plain(text: str) -> str:
+    """Without colours and other control sequences."""
+    return Text.from_ansi(_CONTROL.sub("", text)).plain
 
 
 def after_the_view(text: str) -> str:
