@@ -109,7 +109,8 @@ class Decoder:
             law = known.name if known else self._law or f"law_{frame.law_id}"
             units = tuple(_name_unit(word) for word in words)
             scales = tuple(self._scale(word) for word in words)
-            self._table = TelemetryTable(law, layouts.telemetry(law, units), units, scales)
+            layout = layouts.telemetry(law, units, [word.about for word in words])
+            self._table = TelemetryTable(law, layout, units, scales)
         return self._table
 
     def _scale(self, word: Word) -> float:

@@ -3,7 +3,7 @@
 Encoding is CDR (little endian, XCDR1: four header bytes, then every field aligned to its size) with ros2msg schemas.
 Fields stand in falling size, so there is no padding and `np.frombuffer(rows, layout.dtype)` reads messages of fixed
 size in bulk once the four header bytes are taken off. Field names are lower case because ros2msg wants it; the suffix
-is the unit. `fate` is a sil.sinks.journal.Fate everywhere.
+is the unit, which also stands in brackets before the meaning. `fate` is a sil.sinks.journal.Fate everywhere.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ TRUTH = Layout(
     "The plant at the tick and the torque that acts from this tick on. Frames: N inertial, B body, v_N = q v_B q*.",
     [
         Field("float64", "q_bn", 4, "attitude of the body in inertial space, scalar first"),
-        Field("float64", "omega_bn_b_radps", 3, "body rate, body axes, rad/s"),
-        Field("float64", "momentum_nms", 3, "absolute wheel momentum, body axes, N m s"),
-        Field("float64", "euler_rad", 3, "attitude angles x, y, z relative to attitude.frame, rad"),
-        Field("float64", "euler_deg", 3, "the same, deg"),
-        Field("float64", "applied_nm", 3, "torque on the body after limits, body axes, N m"),
-        Field("float64", "setpoint_deg", 3, "set-point as the laboratory resolved it, deg"),
+        Field("float64", "omega_bn_b_radps", 3, "[rad/s] body rate, body axes"),
+        Field("float64", "momentum_nms", 3, "[N m s] absolute wheel momentum, body axes"),
+        Field("float64", "euler_rad", 3, "[rad] attitude angles x, y, z relative to attitude.frame"),
+        Field("float64", "euler_deg", 3, "[deg] the same"),
+        Field("float64", "applied_nm", 3, "[N m] torque on the body after limits, body axes"),
+        Field("float64", "setpoint_deg", 3, "[deg] set-point as the laboratory resolved it"),
         Field("uint32", "tick", 1, "tick number"),
         Field("uint8", "source", 1, "applied torque: 0 zero, 1 fresh, 2 held"),
     ],
@@ -88,16 +88,16 @@ SAMPLE = Layout(
     "sil/msg/Sample",
     "A decoded SAMPLE frame. A reading that was not sent is NaN with age 0xffffffff.",
     [
-        Field("float64", "setpoint_deg", 3, "set-point, deg"),
-        Field("float64", "applied_nm", 3, "torque on the body from this tick on, N m"),
-        Field("float64", "momentum_nms", 3, "absolute wheel momentum, N m s"),
-        Field("float64", "euler_deg", 3, "reading: attitude angles, deg"),
+        Field("float64", "setpoint_deg", 3, "[deg] set-point"),
+        Field("float64", "applied_nm", 3, "[N m] torque on the body from this tick on"),
+        Field("float64", "momentum_nms", 3, "[N m s] absolute wheel momentum"),
+        Field("float64", "euler_deg", 3, "[deg] reading: attitude angles"),
         Field("float64", "quaternion", 4, "reading: attitude quaternion, scalar first"),
-        Field("float64", "rate_radps", 3, "reading: body rates, rad/s"),
+        Field("float64", "rate_radps", 3, "[rad/s] reading: body rates"),
         Field("uint32", "tick", 1, "tick number"),
         Field("uint32", "ack", 1, "source tick of the command that acts now, 0xffffffff before the first"),
-        Field("uint32", "transit_us", 1, "modelled transit time, us"),
-        Field("uint32", "age_us", 3, "age of the readings at t_k: angles, quaternion, rates, us"),
+        Field("uint32", "transit_us", 1, "[us] modelled transit time"),
+        Field("uint32", "age_us", 3, "[us] age of the readings at t_k: angles, quaternion, rates"),
         Field("uint8", "source", 1, "applied torque: 0 zero, 1 fresh, 2 held"),
         Field("uint8", "present", 1, "bit mask of readings sent: 0 angles, 1 quaternion, 2 rates"),
         Field("uint8", "valid", 1, "bit mask of valid readings"),
@@ -109,9 +109,9 @@ COMMAND = Layout(
     "sil/msg/Command",
     "A decoded COMMAND frame.",
     [
-        Field("float64", "torque_nm", 3, "commanded torque on the body, body axes, N m"),
+        Field("float64", "torque_nm", 3, "[N m] commanded torque on the body, body axes"),
         Field("uint32", "tick", 1, "tick it was computed at"),
-        Field("int32", "torque_lsb", 3, "the same in wire units, 2^-torque_bits N m"),
+        Field("int32", "torque_lsb", 3, "[2^-torque_bits N m] the same in wire units"),
         Field("uint16", "flags", 1, "bits as in protocol/SPEC.md"),
         Field("uint8", "used", 1, "1 sample used, 2 propagated, 3 repeated, 4 restarted, 5 reused"),
         Field("uint8", "follows", 1, "number of TELEMETRY and EVENT frames that follow"),
@@ -144,11 +144,11 @@ TIMING = Layout(
     "sil/msg/Timing",
     "Wall-clock behaviour of one tick on this machine.",
     [
-        Field("int64", "lateness_ns", 1, "wake-up after the deadline, ns"),
-        Field("int64", "answer_ns", 1, "from SAMPLE sent to COMMAND received, ns; -1: no answer"),
-        Field("int64", "work_ns", 1, "CPU time the laboratory took for the tick before; 0 in lockstep"),
-        Field("int64", "gc_ns", 1, "of it (wall time): garbage collection"),
-        Field("int64", "log_ns", 1, "of it (wall time): the journal's write"),
+        Field("int64", "lateness_ns", 1, "[ns] wake-up after the deadline"),
+        Field("int64", "answer_ns", 1, "[ns] from SAMPLE sent to COMMAND received; -1: no answer"),
+        Field("int64", "work_ns", 1, "[ns] CPU time the laboratory took for the tick before; 0 in lockstep"),
+        Field("int64", "gc_ns", 1, "[ns] of it (wall time): garbage collection"),
+        Field("int64", "log_ns", 1, "[ns] of it (wall time): the journal's write"),
         Field("uint32", "tick", 1, "tick number"),
         Field("uint32", "cause", 1, "late by: 0 nothing, 1 machine, 2 own work, 3 collection, 4 log, 5 answer, 6 link"),
     ],
@@ -169,7 +169,7 @@ class PacketLayout:
         b"uint8[] encoded  # bytes on the wire where a byte fault altered them, else empty\n"
         b"string cause  # why it was lost, altered or late, else empty\n"
         b"uint8 copy  # 0 the frame's own, 1 of a duplicate\n"
-        b"int64 arrival_ns  # modelled, on the simulation's clock, had it not been lost; -1 not modelled\n"
+        b"int64 arrival_ns  # [ns] modelled, on the simulation's clock, had it not been lost; -1 not modelled\n"
     )
     _HEAD = struct.Struct("<4sIHBBI")
     _LENGTH = struct.Struct("<I")
@@ -230,7 +230,7 @@ class HousekeepingLayout:
     name = "sil/msg/Housekeeping"
     schema = (
         b"# A housekeeping frame, header to CRC, before COBS.\n"
-        b"int64 host_ns  # CLOCK_MONOTONIC of the laboratory, ns\n"
+        b"int64 host_ns  # [ns] CLOCK_MONOTONIC of the laboratory\n"
         b"uint8[] packet  # header to CRC\n"
     )
     _HEAD = struct.Struct("<4sqI")
@@ -259,9 +259,9 @@ class JointStateLayout:
         b"# Wheels as joints about the body axes. Arrays are empty where nothing is known.\n"
         b"std_msgs/Header header  # stamp: simulation time; frame_id: body\n"
         b"string[] name  # wheel_x, wheel_y, wheel_z\n"
-        b"float64[] position  # rad: empty\n"
-        b"float64[] velocity  # relative to the body, rad/s: empty without spin inertia, NaN of one wheel without\n"
-        b"float64[] effort  # motor torque on the wheel, N m\n"
+        b"float64[] position  # [rad] empty\n"
+        b"float64[] velocity  # [rad/s] relative to the body; empty without spin inertia, NaN of one wheel without\n"
+        b"float64[] effort  # [N m] motor torque on the wheel: the negative of what acts on the body\n"
         + b"=" * 80
         + b"\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
         + b"=" * 80
@@ -296,9 +296,16 @@ def _aligned(before: bytes, *texts: str) -> bytes:
     return before
 
 
-def telemetry(law: str, words: Sequence[tuple[str, str]]) -> Layout:
-    """The TELEMETRY layout of one law: a float64 per word, given as (name, unit), then tick, law and fate."""
-    fields = [Field("float64", _ros_name(name), 1, unit or "1") for name, unit in words]
+def telemetry(law: str, words: Sequence[tuple[str, str]], abouts: Sequence[str] = ()) -> Layout:
+    """The TELEMETRY layout of one law: a float64 per word, given as (name, unit), then tick, law and fate.
+
+    abouts: what each word means; a reader can do without.
+    """
+    said = [*abouts, *[""] * (len(words) - len(abouts))]
+    fields = [
+        Field("float64", _ros_name(name), 1, f"[{unit or '1'}] {about}".rstrip())
+        for (name, unit), about in zip(words, said, strict=True)
+    ]
     tail = [
         Field("uint32", "tick", 1, "tick number"),
         Field("uint16", "law_id", 1, "law"),
