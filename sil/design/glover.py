@@ -8,6 +8,7 @@
 
 Source: Glover and McFarlane 1989; the formulas as in Skogestad and Postlethwaite, Multivariable Feedback Control, 9.4
 (D = 0 here, since the plant has two poles more than zeros). For 1/s^2 alone gamma_min = sqrt(4 + 2 sqrt 2) = 2.613.
+Solved in the time 1 / wc, where all numbers are near 1.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 
 from sil.design.linear import StateSpace, TransferFunction, series, state_space, transfer_function
-from sil.design.plants import double_integrator, pade
+from sil.design.plants import double_integrator, late
 from sil.trouble import UsageError
+
+LEAST_FACTOR, MOST_FACTOR = 1.0001, 100.0  # K has a pole that goes to infinity as the factor goes to 1
 
 
 class Shape(NamedTuple):
@@ -42,12 +45,15 @@ class Design(NamedTuple):
 
 def glover(shape: Shape, delay_s: float = 0.0, pade_order: int = 2, factor: float = 1.1) -> Design:
     """The compensator of order 4 + Pade, + 2 with integral action."""
-    if factor <= 1.0:
-        raise UsageError(f"gamma: expected more than 1 times the least, got {factor:g}")
-    W = weight(shape)
-    shaped = series(series(state_space(W), state_space(pade(delay_s, pade_order))), double_integrator())
+    if not LEAST_FACTOR <= factor <= MOST_FACTOR:
+        expected = f"{LEAST_FACTOR:g} to {MOST_FACTOR:g} times the least, for which there is no compensator"
+        raise UsageError(f"gamma: expected {expected}, got {factor}")
+    rate = shape.crossover
+    W = weight(shape._replace(crossover=1.0, integral=shape.integral / rate))
+    shaped = series(series(state_space(W), late(delay_s, pade_order, rate)), double_integrator())
     K, least = robust(shaped, factor)
-    return Design(series(K, state_space(W)), W, least, factor * least)
+    C = series(K, state_space(W)).faster(rate).scaled(rate**2)
+    return Design(C, weight(shape), least, factor * least)
 
 
 def weight(shape: Shape) -> TransferFunction:

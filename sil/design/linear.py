@@ -54,6 +54,10 @@ class StateSpace(NamedTuple):
         """The same times a gain at its output."""
         return self._replace(C=self.C * gain, D=self.D * gain)
 
+    def faster(self, rate: float) -> StateSpace:
+        """H(s / rate): the same answer in so much less time; continuous."""
+        return self._replace(A=self.A * rate, B=self.B * rate)
+
 
 class TransferFunction(NamedTuple):
     """numerator(s) / denominator(s), highest power first."""

@@ -10,10 +10,11 @@ from math import factorial
 
 import numpy as np
 
-from sil.design.linear import StateSpace, TransferFunction, transfer_function
+from sil.design.linear import StateSpace, TransferFunction, state_space, transfer_function
 from sil.trouble import UsageError
 
 PADE_ORDERS = (1, 2, 3, 4)
+SHORTEST = 1e-3
 
 
 def double_integrator(inertia: float = 1.0, rate_too: bool = False) -> StateSpace:
@@ -34,3 +35,15 @@ def pade(delay_s: float, order: int) -> TransferFunction:
     ]
     powers = range(n, -1, -1)
     return transfer_function([c[k] * (-delay_s) ** k for k in powers], [c[k] * delay_s**k for k in powers])
+
+
+def late(delay_s: float, order: int, rate_radps: float) -> StateSpace:
+    """pade() in the time 1 / rate, with states made for a delay of 1: powers of a short one would swamp all others.
+
+    A delay below SHORTEST of that time changes nothing, but its poles are so fast that no margin is found: refused.
+    """
+    delay = delay_s * rate_radps
+    if 0.0 < delay < SHORTEST:
+        least = SHORTEST / rate_radps
+        raise UsageError(f"delay: expected 0, or at least {least:.3g} s beside these rates, got {delay_s:g}")
+    return state_space(pade(1.0, order)).faster(1.0 / delay) if delay else state_space(pade(0.0, order))

@@ -126,7 +126,7 @@ def _sheet(
         discrete, plant = stepped(C, sampling)
         late = sampling.ticks * sampling.period_s + sampling.sensor_delay_s
         found[_sampled_name(sampling)] = margins.sampled(discrete, plant, late)
-    if isinstance(C, StateSpace) and np.any(C.poles.real > 1e-9):
+    if isinstance(C, StateSpace) and np.any(C.poles.real > 1e-9 * np.max(np.abs(C.poles), initial=0.0)):
         warnings = (*warnings, "the compensator itself is unstable: where the torque is clipped it runs away")
     if discrete is not None and discrete.order > MOST_STATES:
         warnings = (*warnings, f"order {discrete.order}: law state_space takes at most {MOST_STATES}, see --order")
@@ -165,7 +165,7 @@ def written(C: StateSpace | TransferFunction) -> str:
     else:
         zeros, poles = zeros_of(C), C.poles
         at = C.at
-    fastest = float(np.max(np.abs(np.concatenate([zeros, poles])), initial=1.0))
+    fastest = float(np.max(np.abs(np.concatenate([zeros, poles])), initial=0.0)) or 1.0
     above, below = (_factors(roots, 1e-9 * fastest) for roots in (zeros, poles))
     s = 1.37 * fastest
     gain = at(s) * np.prod([value(s) for _, value in below]) / np.prod([value(s) for _, value in above])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -305,6 +306,9 @@ def fuzzy(
         raise UsageError("--json, --yaml: expected one of them, got both")
     if not 3 <= entries <= 257:
         raise UsageError(f"--entries: expected 3 to 257, got {entries}")
+    _one_of("--inputs", inputs, sets.SHAPES)
+    _one_of("--outputs", outputs, sets.SHAPES)
+    _one_of("--aggregation", aggregation, sets.AGGREGATIONS)
     E, L = _positive("--error", error), _positive("--output", output)
     if angle is None:
         inference = sets.one_input(E, L, inputs, outputs, aggregation)
@@ -341,16 +345,20 @@ def _sampling(period: float | None, ticks: int, sensor_delay: float, method: str
     from sil.design.discrete import METHODS
     from sil.design.sheet import Sampling
 
-    if method not in METHODS:
-        raise UsageError(f"--method: expected one of {', '.join(METHODS)}, got {method}")
+    _one_of("--method", method, METHODS)
     if not 0 <= ticks <= 4:
         raise UsageError(f"--ticks: expected 0 to 4, got {ticks}")
-    if order is not None and order < 0:
-        raise UsageError(f"--order: expected a number of states, got {order}")
+    if order is not None and order < 1:
+        raise UsageError(f"--order: expected a number of states, at least 1, got {order}")
     _not_negative("--sensor-delay", sensor_delay)
     if period is None:
         return None
     return Sampling(_positive("--period", period), ticks, sensor_delay, method, order)
+
+
+def _one_of(option: str, got: str, known: Sequence[str]) -> None:
+    if got not in known:
+        raise UsageError(f"{option}: expected one of {', '.join(known)}, got {got}")
 
 
 def _positive(option: str, value: float) -> float:

@@ -43,6 +43,29 @@ def test_integral_action_and_delay_end_up_in_the_compensator() -> None:
     assert np.all(np.linalg.eigvals(closed_loop(behind, C)).real < 0.0)
 
 
+@pytest.mark.parametrize("rate", [1e-5, 1e-3, 1e3])
+def test_a_slow_design_is_a_fast_one_in_another_unit_of_time(rate: float) -> None:
+    """C(s) = rate^2 C1(s / rate). Solved in seconds the LQG of 1e-3 rad/s had poles 20 % off, and nobody was told."""
+    omega = np.geomspace(0.01, 30.0, 50)
+    for made, unit in (
+        (lqg(Weights(0.5 * rate, 2.0 * rate, 0.1 * rate), 0.4 / rate, 4), lqg(Weights(0.5, 2.0, 0.1), 0.4, 4)),
+        (
+            glover(Shape(0.5 * rate, 4.0, 8.0, 0.02 * rate), 0.4 / rate, 4).compensator,
+            glover(Shape(0.5, 4.0, 8.0, 0.02), 0.4, 4).compensator,
+        ),
+    ):
+        ratio = made.response(rate * omega) / (rate**2 * unit.response(omega))
+        np.testing.assert_allclose(ratio, 1.0, rtol=1e-7)
+
+
+def test_a_delay_that_is_none_and_a_factor_without_margin_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"delay: expected 0, or at least 0.001 s beside these rates, got 1e-06"):
+        lqg(Weights(0.5, 2.0), 1e-6)
+    for factor in (1.0, float("nan"), float("inf")):
+        with pytest.raises(UsageError, match=f"gamma: expected 1.0001 to 100 times the least.*got {factor}"):
+            glover(Shape(0.5), factor=factor)
+
+
 @pytest.mark.parametrize(("name", "J", "digits"), [("lqg-5.1", 0.01, 1e-5), ("lqg-5.3", 400.0, 1e-3)])
 def test_the_papers_lqg_is_ours_with_the_same_weights_for_both_satellites(name: str, J: float, digits: float) -> None:
     """Gain to `digits`, time constants to the two digits that are printed."""

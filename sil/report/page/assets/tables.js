@@ -121,6 +121,7 @@ SIL.registers = (registers) => {
     ]), { class: "wide registers" }));
 };
 
+const PRINTED = 40; // events on paper; page.css has the same number
 SIL.events = (events) => {
   if (!events.rows.length) return el("p", { class: "note" }, "None.");
   const all = events.counts.reduce((sum, [, count]) => sum + count, 0);
@@ -129,8 +130,9 @@ SIL.events = (events) => {
     el("td", {}, origin), el("td", { class: "code" }, name), el("td", {}, text),
   ]);
   const left = all > rows.length ? el("p", { class: "note" }, `${SIL.count(all - rows.length)} more of the same kinds are in the log.`) : null;
+  const printed = rows.length > PRINTED ? el("p", { class: "note print-only" }, `Printed are the first ${PRINTED} of ${SIL.count(rows.length)}.`) : null;
   return el("div", {}, el("div", { class: "keys" }, events.counts.map(([name, count]) => el("span", { class: "chip" }, `${name} ${SIL.count(count)}`))),
-    el("div", { class: "tall", tabindex: "0", role: "region", "aria-label": "list of events" }, table(["time", "from", "event", "what"], rows, { class: "wide" })), left);
+    el("div", { class: "tall", tabindex: "0", role: "region", "aria-label": "list of events" }, table(["time", "from", "event", "what"], rows, { class: "wide" })), printed, left);
 };
 
 SIL.pairs = (rows) => table(null, rows.map(([key, value]) => [key, el("td", { class: "code" }, value)]), { class: "pairs" });
