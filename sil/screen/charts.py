@@ -62,8 +62,9 @@ def _chart(seen: Seen, which: str, axis: int, width: int, height: int) -> list[T
     inner = height - 2
     cells = marks.chart(series, (first, now, low, high), width - LABEL, inner)
     title = Text.assemble((f"{AXES[axis]} {which}, deg", TONES[axis]))
-    if len(series) == 2:
-        title.append(f"   {seen.plan.follows} dim", DIM)
+    under = f"   {seen.plan.follows} dim" if len(series) == 2 else ""
+    if title.cell_len + len(under) <= width:  # else the colour has to tell
+        title.append(under, DIM)
     rows = [title]
     labels = {0: high, inner - 1: low}
     for place, cell_row in enumerate(cells):

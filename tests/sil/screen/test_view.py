@@ -48,6 +48,12 @@ def test_a_large_window_has_charts_of_attitude_and_error() -> None:
     assert max(len(line.rstrip()) for line in shown.splitlines()) > 140
 
 
+def test_a_chart_too_narrow_for_what_its_dim_line_is_does_not_say_half_of_it() -> None:
+    narrow, wide = text(made.seen(follows="reference"), 100, 40), text(made.seen(follows="reference"), 140, 45)
+    assert "pitch attitude, deg" in narrow and "reference d" not in narrow
+    assert "pitch attitude, deg   reference dim" in wide
+
+
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1e300])
 def test_a_run_that_blows_up_is_still_shown(bad: float) -> None:
     """Protects: the view of a diverging run, which is when somebody looks."""
