@@ -35,7 +35,6 @@ ORDER: dict[str, tuple[str, ...]] = {  # of the pages of a folder in the sidebar
         "troubleshoot",
     ),
     "papers": ("five-papers",),
-    "papers": ("five-papers",),
     "reference": ("cli", "scenario", "scenarios", "python", "topics", "wire", "glossary"),
 }  # fmt: skip
 PLAIN = ("crc", "frame", "law", "layout", "packet", "stream")  # names that SPEC.md gives its blocks
