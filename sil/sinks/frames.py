@@ -8,7 +8,8 @@
 
 The reference of a tick is what the board's TELEMETRY of that tick says, from the tick on in which its reference model
 began (a board that has read nothing yet reports zeros). Where the board has no reference model that differs from the
-set-point, it is the set-point. Otherwise there is none: no transform rather than a wrong one.
+set-point, it is the set-point. Otherwise there is none: no transform rather than a wrong one. The same goes for a truth
+that is not a number.
 """
 
 from __future__ import annotations
@@ -59,23 +60,25 @@ class Frames:
         """The board says that its reference model began."""
         self._running = True
 
-    def body(self, truth: Truth) -> Quaternion:
+    def body(self, truth: Truth) -> Quaternion | None:
         """q_BN."""
-        return self._continued(BODY, truth.q_BN)
+        return self._continued(BODY, truth.q_BN) if math.isfinite(sum(truth.q_BN)) else None
 
     def orbital(self, t_ns: int, truth: Truth) -> Quaternion | None:
         """q_ON."""
         if not self._known:
             return None
         if self._lvlh:
+            if not math.isfinite(sum(truth.q_BN) + sum(truth.euler_rad)):
+                return None
             q_BO = pointing.q_of_euler(truth.euler_rad, self._sequence)
             return self._continued(ORBITAL, pointing.times(truth.q_BN, pointing.inverse(q_BO)))
         half = self._orbit.u_rad(t_ns * 1e-9) / 2.0
         return pointing.q_of_orbit(math.cos(half), math.sin(half), self._orbit.tilt_rad)
 
     def reported(self, words: Sequence[int]) -> Quaternion | None:
-        """Of TELEMETRY's words; None: the board's reference has not begun."""
-        return self.pointed(words[:3]) if self._running else None
+        """Of TELEMETRY's words; None: the board's reference has not begun, or there are fewer than three words."""
+        return self.pointed(words[:3]) if self._running and len(words) >= 3 else None
 
     def pointed(self, angles_bam: Sequence[int]) -> Quaternion | None:
         """Of the angles [x, y, z] in 2^-32 turn."""

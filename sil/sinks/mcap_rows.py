@@ -135,7 +135,9 @@ class RunRows:
 
     def _turns(self, t_ns: int, truth: jn.Truth) -> dict[str, Quaternion]:
         """The rotations of a tick by frame."""
-        turns = {BODY: self._frames.body(truth)}
+        turns = {}
+        if (body := self._frames.body(truth)) is not None:
+            turns[BODY] = body
         if (orbital := self._frames.orbital(t_ns, truth)) is not None:
             turns[ORBITAL] = orbital
         if (reference := self._reference()) is not None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
+from mcap_ros2.decoder import DecoderFactory as Ros2Decoder
 from scipy.spatial.transform import Rotation
 
 from sil import open_run
@@ -71,6 +72,18 @@ def test_tf_turns_the_body_to_where_it_points(run: tuple[Run, str]) -> None:
     up = tf["body"][1].apply(np.eye(3))
     seen = tf["orbital"][1].inv().apply(up) if log.scenario["attitude"]["frame"] == "lvlh" else up
     assert np.allclose(seen, POINTED[name][1:], atol=1e-7)
+
+
+def test_speeds_of_wheels_are_those_relative_to_the_body(tmp_path: Path) -> None:
+    """As the scenario gives them, in a body that turns, so that the absolute ones are others."""
+    wheels = "actuators.wheels={inertia_kgm2: 0.01, initial_speed_radps: [100, -50, 0]}"
+    rate = "plant.initial={rate_kind: body_inertial, rate_degps: [10, 20, 30]}"
+    run_scenario(load_scenario("rigid-open-loop", [wheels, rate, "require=[]", "duration_s=1"]), tmp_path / "run")
+    with open(tmp_path / "run" / "run.mcap", "rb") as file:
+        reader = make_reader(file, validate_crcs=True, decoder_factories=[Ros2Decoder()])
+        first: Any = next(reader.iter_decoded_messages(topics=["/joint_states"]))[3]
+    assert first.name == ["wheel_x", "wheel_y", "wheel_z"]
+    assert np.allclose(first.velocity, [100, -50, 0], atol=1e-12)
 
 
 @EACH

@@ -16,6 +16,7 @@ from synthetic import synthetic_journal
 from viewers import PERIOD_NS, Feed, configured, session, truth
 
 from protocol import events
+from protocol.frames import Telemetry
 from sil.runs import open_run
 from sil.sinks import journal as jn
 from sil.sinks.journal import Kind, Record
@@ -116,6 +117,27 @@ def test_a_scenario_that_makes_no_sense_is_as_good_as_none(nonsense: object) -> 
     feed.tick(0, *configured(), feed.telemetry(0, (0, 0, 0)), feed.begins(0), truth(0))
     assert list(feed.transforms()[0]) == ["body"]
     assert not feed.sheet.of("/joint_states")
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf])
+def test_what_is_not_a_number_is_no_transform(wrong: float) -> None:
+    """A plant that runs away leaves a log all the same; what comes after is shown again."""
+    feed = Feed()
+    feed.tick(0, *configured(), feed.begins(0), feed.telemetry(0, (0, 0, 0)), truth(0, euler_rad=(0.0, wrong, 0.0)))
+    feed.tick(1, feed.telemetry(1, (0, 0, 0)), truth(1, q_BN=(wrong, 0.0, 0.0, 0.0), momentum=(wrong, 0.0, 0.0)))
+    feed.tick(2, feed.telemetry(2, (0, 0, 0)), truth(2))
+    assert [list(tf) for tf in feed.transforms()] == [
+        ["body", "reference"],
+        ["reference"],
+        ["body", "orbital", "reference"],
+    ]
+
+
+def test_a_board_whose_telemetry_is_too_short_has_no_reference() -> None:
+    feed = Feed()
+    short = feed.down(Telemetry(0, 9999, 1, (5, 5)))
+    feed.tick(0, *configured(), feed.begins(0), short, truth(0))
+    assert list(feed.transforms()[0]) == ["body", "orbital"]
 
 
 def test_signs_are_continuous() -> None:
