@@ -3,6 +3,7 @@
     inertial (N)    the root
     orbital (O)     in inertial. attitude.frame lvlh: q_NO = q_NB (x) q_OB^-1 of TRUTH's quaternion and angles, so that
                     the body in it has just those angles, whatever the plant; inertial: by plant.orbit
+    horizon         in orbital, half a turn about x: z up. Viewers draw z upwards, so in this one the Earth is below
     body (B)        in inertial: TRUTH's q_BN
     reference       where the body ought to point: in orbital, or in inertial where that is the frame of the angles
 
@@ -22,7 +23,8 @@ from sil import pointing
 from sil.pointing import Quaternion
 from sil.sinks.journal import Truth
 
-INERTIAL, ORBITAL, BODY, REFERENCE = "inertial", "orbital", "body", "reference"
+INERTIAL, ORBITAL, HORIZON, BODY, REFERENCE = "inertial", "orbital", "horizon", "body", "reference"
+HORIZON_IN_ORBITAL: Quaternion = (0.0, 1.0, 0.0, 0.0)
 _RAD_PER_BAM = 2.0 * math.pi / 2**32
 
 

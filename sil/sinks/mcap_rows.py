@@ -19,7 +19,7 @@ from sil.pointing import Quaternion
 from sil.sinks import events, layouts, viewer
 from sil.sinks import journal as jn
 from sil.sinks.decoding import DEG_PER_BAM, Decoder
-from sil.sinks.frames import BODY, INERTIAL, ORBITAL, REFERENCE, Frames
+from sil.sinks.frames import BODY, HORIZON, HORIZON_IN_ORBITAL, INERTIAL, ORBITAL, REFERENCE, Frames
 from sil.sinks.journal import Direction, Fate, Kind, PacketRecord, Record
 from sil.sinks.scene import Parts, scene
 
@@ -124,7 +124,8 @@ class RunRows:
             self._frames, self._wheels = Frames(scenario), viewer.wheels_of(scenario)
         except (AttributeError, TypeError, ValueError, ArithmeticError):  # whoever opens the log is told
             self._frames, self._wheels = Frames(None), None
-        parents = {ORBITAL: INERTIAL, BODY: INERTIAL, REFERENCE: self._frames.parent_of_reference}
+        reference_in = self._frames.parent_of_reference
+        parents = {BODY: INERTIAL, ORBITAL: INERTIAL, HORIZON: ORBITAL, REFERENCE: reference_in}
         self._transforms = viewer.Transforms(parents)
         if self._wheels is not None:
             self._channels.update(_register(self._writer, [("/joint_states", layouts.JointStateLayout)]))
@@ -140,6 +141,7 @@ class RunRows:
             turns[BODY] = body
         if (orbital := self._frames.orbital(t_ns, truth)) is not None:
             turns[ORBITAL] = orbital
+            turns[HORIZON] = HORIZON_IN_ORBITAL
         if (reference := self._reference()) is not None:
             turns[REFERENCE] = reference
         elif self._decoder.follows_setpoint and (setpoint := self._frames.pointed(truth.setpoint_bam)) is not None:

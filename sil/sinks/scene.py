@@ -24,6 +24,8 @@ XYZ = tuple[float, float, float]
 BODY_SIZE_m: XYZ = (0.6, 0.5, 0.4)
 PANEL_SIZE_m: XYZ = (0.34, 0.62, 0.015)
 PANEL_AT_m = 0.64  # middle of a panel, on either side along y
+ARM_SIZE_m: XYZ = (0.03, 0.1, 0.03)  # from the body to a panel
+ARM_AT_m = 0.29
 NOSE_m, NOSE_RADIUS_m = 0.2, 0.11
 WHEEL_RADIUS_m, WHEEL_HEIGHT_m = 0.1, 0.04
 WHEELS_AT_m: tuple[XYZ, ...] = ((0.16, 0.0, 0.0), (-0.03, 0.14, 0.0), (-0.12, -0.06, 0.08))
@@ -80,6 +82,7 @@ def _satellite(entity: Any, wheels: bool) -> None:
     _box(entity, (0.0, 0.0, 0.0), BODY_SIZE_m, BODY_COLOUR)
     for side in (1.0, -1.0):
         _box(entity, (0.0, side * PANEL_AT_m, 0.0), PANEL_SIZE_m, PANEL_COLOUR)
+        _box(entity, (0.0, side * ARM_AT_m, 0.0), ARM_SIZE_m, EDGE_COLOUR)
     _lines(entity, _edges(BODY_SIZE_m), EDGE_COLOUR, 1.5)
     nose = _cylinder(entity, (BODY_SIZE_m[0] / 2 + NOSE_m / 2, 0.0, 0.0), 0, NOSE_RADIUS_m, NOSE_m, AXIS_COLOURS[0])
     nose.top_scale = 0.0

@@ -115,7 +115,7 @@ def test_telemetry_and_transforms(seen: dict[str, Any], run: Run) -> None:
     first = seen["topics"]["/telemetry"]["rows"][3]
     assert first["reference_x"] == bits(float(run["reference_x"][3]))
     parts = {part["child_frame_id"]: part for part in seen["topics"]["/tf"]["rows"][7]["transforms"]}
-    assert [part["parent_frame_id"] for part in parts.values()] == ["inertial", "inertial", "orbital"]
+    assert [part["parent_frame_id"] for part in parts.values()] == ["inertial", "inertial", "orbital", "orbital"]
     assert [parts["body"]["rotation"][c] for c in "wxyz"] == [bits(v) for v in run["q_BN"][7].tolist()]
     assert parts["reference"]["timestamp"]["seconds"] == bits(3)
 
@@ -136,7 +136,7 @@ def test_scene(seen: dict[str, Any]) -> None:
     satellite, reference, directions = seen["topics"]["/scene"]["rows"][0]["entities"]
     assert [e["frame_id"] for e in (satellite, reference, directions)] == ["body", "reference", "orbital"]
     assert [text["text"] for text in satellite["texts"]] == ["x", "y", "z"]
-    assert (len(satellite["cubes"]), len(satellite["cylinders"]), len(reference["lines"])) == (3, 4, 1)
+    assert (len(satellite["cubes"]), len(satellite["cylinders"]), len(reference["lines"])) == (5, 4, 1)
 
 
 def test_counts_and_identity(seen: dict[str, Any], run: Run) -> None:

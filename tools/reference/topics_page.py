@@ -103,14 +103,15 @@ ONLY_OF_THE_HOST = {"/event": "each event of this machine's clock", "/log": "the
 VIEWERS: dict[str, tuple[str, tuple[tuple[str, str, str, str], ...]]] = {
     "/tf": (
         "Rotations between frames, in this order. `body` in `inertial`: q_BN of `/truth`. `orbital` in `inertial`: x "
-        "along-track, y = -orbit normal, z nadir. `reference`, where the body ought to point, in `orbital` or, where "
+        "along-track, y = -orbit normal, z nadir. `horizon` in `orbital`: the same with z up, so that the Earth is "
+        "below in a viewer that displays it. `reference`, where the body ought to point, in `orbital` or, where "
         "`attitude.frame` is inertial, in `inertial`: what TELEMETRY of the same tick reports, from the tick on in "
         "which the board's reference model began; the set-point where the board has no model that differs from it; "
         "otherwise there is no such transform. Signs are continuous.",
         (
             ("transforms[].timestamp", "google.protobuf.Timestamp", "s, ns", "t_k"),
             ("transforms[].parent_frame_id", "string", "", "`inertial` or `orbital`"),
-            ("transforms[].child_frame_id", "string", "", "`body`, `orbital`, `reference`"),
+            ("transforms[].child_frame_id", "string", "", "`body`, `orbital`, `horizon`, `reference`"),
             ("transforms[].translation", "foxglove.Vector3", "m", "zero"),
             ("transforms[].rotation", "foxglove.Quaternion", "1", "x, y, z, w: v_parent = q v_child q*"),
         ),

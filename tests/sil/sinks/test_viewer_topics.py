@@ -25,6 +25,7 @@ from sil.sinks.seal import seal
 from sil.sinks.viewer import WHEELS
 
 HALF = math.sqrt(0.5)
+ALL = ["body", "orbital", "horizon", "reference"]  # frames of a tick, in their order
 ZERO = (0.0, 0.0, 0.0)
 EQUATORIAL = {"plant": {"orbit": {"radius_m": 7.0e6, "mu": 4.0e14, "inclination_deg": 0.0, "u0_deg": 0.0}}}
 
@@ -43,8 +44,8 @@ def test_body_in_the_orbital_frame_has_the_angles_of_the_log_and_the_reference_i
     answer = (feed.telemetry(0, (0, 0, 90)), feed.begins(0))
     feed.tick(0, session(0), *configured(), *answer, truth(0, q_BN, ZERO, ZERO, euler))
     (tf,) = feed.transforms()
-    assert list(tf) == ["body", "orbital", "reference"]
-    assert [tf[frame][0] for frame in tf] == ["inertial", "inertial", "orbital"]
+    assert list(tf) == ALL
+    assert [tf[frame][0] for frame in tf] == ["inertial", "inertial", "orbital", "orbital"]
     assert tf["body"][1] == tuple(q_BN)
     in_orbital = rotation(tf["orbital"][1]).inv() * rotation(tf["body"][1])
     assert np.allclose(in_orbital.as_euler("ZYX")[::-1], euler, atol=1e-14)
@@ -59,6 +60,8 @@ def test_of_an_inertial_frame_the_orbit_is_the_scenarios_and_the_reference_stand
     assert tf["reference"] == ("inertial", pytest.approx((HALF, 0.0, HALF, 0.0), abs=1e-15))
     axes = rotation(tf["orbital"][1]).apply(np.eye(3))
     assert np.allclose(axes, [[0, 1, 0], [0, 0, -1], [-1, 0, 0]], atol=1e-15)
+    level = (rotation(tf["orbital"][1]) * rotation(tf["horizon"][1])).apply(np.eye(3))  # forward, normal, up
+    assert np.allclose(level, [[0, 1, 0], [0, 0, 1], [1, 0, 0]], atol=1e-15)
 
 
 def test_a_reference_that_is_not_known_is_not_sent() -> None:
@@ -83,9 +86,9 @@ def test_where_the_board_follows_the_setpoint_itself_that_is_the_reference() -> 
 @pytest.mark.parametrize(
     ("values", "board", "known", "frames"),
     [
-        ({"telemetry_every": 0}, True, True, ["body", "orbital"]),  # its reference is nowhere in the log
-        ({"reference_kind": "none", "rate_limit": 100, "telemetry_every": 0}, True, True, ["body", "orbital"]),
-        ({}, False, True, ["body", "orbital"]),  # nobody follows anything
+        ({"telemetry_every": 0}, True, True, ALL[:-1]),  # its reference is nowhere in the log
+        ({"reference_kind": "none", "rate_limit": 100, "telemetry_every": 0}, True, True, ALL[:-1]),
+        ({}, False, True, ALL[:-1]),  # nobody follows anything
         ({}, True, False, ["body"]),  # a log that has no scenario
     ],
 )
@@ -95,7 +98,7 @@ def test_what_nobody_knows_is_neither_a_frame_nor_in_the_scene(
     feed = Feed(known=known)
     feed.tick(0, *(configured(**values) if board else ()), truth(0))
     assert list(feed.transforms()[0]) == frames
-    assert {entity.frame_id for entity in feed.sheet.of("/scene")[0].entities} == set(frames)
+    assert {entity.frame_id for entity in feed.sheet.of("/scene")[0].entities} == set(frames) - {"horizon"}
 
 
 @pytest.mark.parametrize(
@@ -129,7 +132,7 @@ def test_what_is_not_a_number_is_no_transform(wrong: float) -> None:
     assert [list(tf) for tf in feed.transforms()] == [
         ["body", "reference"],
         ["reference"],
-        ["body", "orbital", "reference"],
+        ALL,
     ]
 
 
@@ -137,7 +140,7 @@ def test_a_board_whose_telemetry_is_too_short_has_no_reference() -> None:
     feed = Feed()
     short = feed.down(Telemetry(0, 9999, 1, (5, 5)))
     feed.tick(0, *configured(), feed.begins(0), short, truth(0))
-    assert list(feed.transforms()[0]) == ["body", "orbital"]
+    assert list(feed.transforms()[0]) == ALL[:-1]
 
 
 def test_signs_are_continuous() -> None:
@@ -160,7 +163,7 @@ def test_a_telemetry_without_its_tick_is_a_transform_of_its_own() -> None:
     feed.tick(1, truth(1))
     feed.tick(1, feed.telemetry(1, (0, 0, 90)))
     whole, without, late = (list(tf) for tf in feed.transforms())
-    assert (whole, without, late) == (["body", "orbital", "reference"], ["body", "orbital"], ["reference"])
+    assert (whole, without, late) == (ALL, ALL[:-1], ["reference"])
     assert {part.timestamp.nanos for part in feed.sheet.of("/tf")[-1].transforms} == {PERIOD_NS}
 
 
