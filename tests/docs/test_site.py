@@ -22,7 +22,8 @@ from tools.browser import Browser, program
 REPO = Path(__file__).resolve().parents[2]
 DOCS = REPO / "docs"
 SOURCES = sorted(str(path.relative_to(DOCS).with_suffix("")) for path in DOCS.rglob("*.md"))
-KINDS = ("index", "quick-start", "how-to/real-time", "reference/cli", "reference/scenario", "reference/wire")
+REFERENCE = ("cli", "scenario", "python", "topics", "wire")
+KINDS = ("index", "quick-start", "how-to/real-time", *(f"reference/{name}" for name in REFERENCE))
 
 
 def sphinx(source: Path, target: Path) -> subprocess.CompletedProcess[str]:
