@@ -143,7 +143,7 @@ class Link(Section):
     """The cable; `link: URL` is short for its url."""
 
     url: Url = "pty"
-    """pty, udp, inproc, udp://HOST:PORT or serial:///dev/X?baud=N"""
+    """pty, udp, inproc, udp://HOST:PORT, /dev/X or serial:///dev/X?baud=N"""
     baud: Annotated[int, Field(gt=0)] | None = None
     """Bit rate whose wire time is modelled (10 bits a byte); null: the wire takes no time."""
     faults: LinkFaults = LinkFaults()

@@ -86,8 +86,8 @@ def _name_choices(schema: Schema) -> None:
     clocks = _either(("lockstep", "realtime"), SCALES)
     law_names = sorted({table.name for table in LAWS.values()})
     for section, key, choices in (
-        (schema, "board", _either(BOARDS, r"^(serial|udp)://\S+$")),
-        (known["Link"], "url", _either(LINKS, r"^(serial:///?\S+|udp://[^\s:]+:\d+)$")),
+        (schema, "board", _either(BOARDS, r"^((serial|udp)://|/dev/)\S+$")),
+        (known["Link"], "url", _either(LINKS, r"^(serial:///?\S+|/dev/\S+|udp://[^\s:]+:\d+)$")),
         (known["Clock"], "mode", clocks),
         (known["Plant"], "kind", _either(list(PLANTS), r"\.py:")),
         (known["Guidance"], "profile", {"enum": list(PROFILES)}),

@@ -152,16 +152,23 @@ def _name(value: object) -> object:
     raise Expected("a name of letters A-Z a-z, digits, _ . and -, a letter or digit first")
 
 
+def _port(value: object) -> object:
+    """The path of a serial port as the URL that it stands for."""
+    return f"serial://{value}" if isinstance(value, str) and value.startswith("/dev/") else value
+
+
 def _board(value: object) -> object:
+    value = _port(value)
     if value in BOARDS or (isinstance(value, str) and re.fullmatch(r"(serial|udp)://\S+", value)):
         return value
-    raise Expected(f"{', '.join(BOARDS)}, serial://PATH or udp://HOST:PORT")
+    raise Expected(f"{', '.join(BOARDS)}, /dev/X, serial:///dev/X?baud=N or udp://HOST:PORT")
 
 
 def _url(value: object) -> object:
+    value = _port(value)
     if value in LINKS or (isinstance(value, str) and re.fullmatch(r"serial:///?\S+|udp://[^\s:]+:\d+", value)):
         return value
-    raise Expected(f"{', '.join(LINKS)}, serial://PATH or udp://HOST:PORT")
+    raise Expected(f"{', '.join(LINKS)}, /dev/X, serial:///dev/X?baud=N or udp://HOST:PORT")
 
 
 def _positive_definite(m: tuple[tuple[float, ...], ...]) -> bool:

@@ -19,7 +19,9 @@ LINKS = {
 def link_class(name: str) -> type[Link]:
     """The class registered as `name`. Raises LinkError naming the known ones."""
     if name not in LINKS:
-        raise LinkError(f"link: expected one of {', '.join(sorted(LINKS))}, got {name!r}")
+        raise LinkError(
+            f"link: expected one of {', '.join(sorted(LINKS))}, or a port such as /dev/ttyUSB0, got {name!r}"
+        )
     module, _, attribute = LINKS[name].partition(":")
     found: type[Link] = getattr(import_module(module), attribute)
     return found
@@ -28,6 +30,7 @@ def link_class(name: str) -> type[Link]:
 def open_link(url: str, listen: bool) -> Link:
     """Open one end of a link. The URL names the board's end; `listen` is True on the board, False in the laboratory.
 
-    `pty` | `inproc` | `udp://HOST:PORT` | `serial:///dev/X?baud=N`. Raises LinkError with a one-line reason.
+    `pty` | `inproc` | `udp://HOST:PORT` | `serial:///dev/X?baud=N` | `/dev/X`. Raises LinkError with a one-line reason.
     """
-    return link_class(url.partition(":")[0]).open(url, listen)
+    whole = f"serial://{url}" if url.startswith("/dev/") else url
+    return link_class(whole.partition(":")[0]).open(whole, listen)

@@ -52,14 +52,13 @@ def chosen(rungs: str | None, more: Sequence[str] = ()) -> tuple[Rung, ...]:
     or as the URL of a board that already runs. Raises UsageError.
     """
     named = list(USUAL) if rungs is None else [name.strip() for name in rungs.split(",")]
-    wanted = list(dict.fromkeys([*named, *more]))
+    wanted = list(dict.fromkeys(f"serial://{name}" if name.startswith("/dev/") else name for name in [*named, *more]))
     hardware = [name for name in wanted if name.startswith(HARDWARE)]
     for name in wanted:
         if name not in RUNGS and name not in hardware:
             option = "--with" if name in more else "--rungs"
-            raise UsageError(
-                f"{option}: expected {one_of(RUNGS, name)}, serial://PATH or udp://HOST:PORT, got {name!r}"
-            )
+            known = f"{one_of(RUNGS, name)}, /dev/X, serial:///dev/X?baud=N or udp://HOST:PORT"
+            raise UsageError(f"{option}: expected {known}, got {name!r}")
     if len(hardware) > 1:
         raise UsageError(f"--with: expected one board that already runs, got {' and '.join(hardware)}")
     top = [Rung(url, "HIL: the board at this address", url) for url in hardware]

@@ -39,7 +39,7 @@ def ladder(
         typer.Option(
             "--with",
             metavar="RUNG",
-            help="One more rung: qemu, or serial://PATH, udp://HOST:PORT of a board that already runs; repeatable.",
+            help="One more rung: qemu, or /dev/X, udp://HOST:PORT of a board that already runs; repeatable.",
             rich_help_panel=RUNGS_PANEL,
             autocompletion=completion.rungs,
         ),

@@ -60,7 +60,7 @@ def run(
         typer.Option(
             "--board",
             metavar="BOARD",
-            help="process, inproc, none; the C firmware: native, cortex-m, qemu; serial://PATH, udp://HOST:PORT: one "
+            help="process, inproc, none; the C firmware: native, cortex-m, qemu; /dev/X, udp://HOST:PORT: one "
             "that already runs.",
             rich_help_panel=KEYS_PANEL,
             autocompletion=completion.boards,
@@ -113,7 +113,7 @@ def plant(
         typer.Option(
             "--link",
             metavar="URL",
-            help="pty, udp://HOST:PORT of the board, or serial://PATH. Default: the scenario's.",
+            help="pty, udp://HOST:PORT of the board, or /dev/X[?baud=N]. Default: the scenario's.",
             rich_help_panel=KEYS_PANEL,
             autocompletion=completion.links,
         ),
@@ -158,7 +158,7 @@ def board(
         typer.Option(
             "--link",
             metavar="URL",
-            help="udp://HOST:PORT to listen on (port 0: any, named on stdout), or serial://PATH[?baud=N].",
+            help="udp://HOST:PORT to listen on (port 0: any, named on stdout), or /dev/X[?baud=N].",
             autocompletion=completion.links,
         ),
     ],

@@ -59,8 +59,14 @@ def test_every_file_in_the_folder_is_registered() -> None:
 
 
 def test_an_unknown_link_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(LinkError, match=r"expected one of inproc, pty, serial, udp, got 'can'"):
+    known = "expected one of inproc, pty, serial, udp, or a port such as /dev/ttyUSB0"
+    with pytest.raises(LinkError, match=f"{known}, got 'can'"):
         open_link("can://0", listen=False)
+
+
+def test_the_path_of_a_port_is_a_link() -> None:
+    with pytest.raises(LinkError, match="serial /dev/no-such-port: cannot open"):
+        open_link("/dev/no-such-port", listen=False)
 
 
 @pytest.mark.parametrize("name", sorted(LINKS))

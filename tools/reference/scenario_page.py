@@ -45,7 +45,8 @@ UNIT = re.compile(r"\[([^\],]*)\] ?")  # with which a description begins
 PATTERNS = {
     "^scaled:": "`scaled:N`",
     r"\.py:": "`./FILE.py:CLASS`",
-    "^(serial": "`serial://PATH`, `udp://HOST:PORT`",
+    "^(serial": "`/dev/X`, `serial:///dev/X?baud=N`, `udp://HOST:PORT`",
+    "^((serial": "`/dev/X`, `serial:///dev/X?baud=N`, `udp://HOST:PORT`",
 }
 NO_BREAK = "\u00a0"  # a space at which no line ends
 LONGEST = 8  # list that is written out as a default

@@ -243,7 +243,7 @@ WARNINGS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("board", ["cortex-m", "qemu", "serial:///dev/ttyUSB0", "udp://127.0.0.1:5005"])
+@pytest.mark.parametrize("board", ["cortex-m", "qemu", "/dev/ttyUSB0", "udp://127.0.0.1:5005"])
 def test_a_board_that_can_restart_may(board: str, tmp_path: Path) -> None:
     (tmp_path / "x.yaml").write_text(f"board: {board}\nrestart_limit: 2\n")
     assert check_scenario(str(tmp_path / "x.yaml")) == []
