@@ -1,7 +1,7 @@
 """The firmware as a library of this machine: its sources found, compiled into the cache once, loaded.
 
-The cache is keyed by a hash of the sources, the compiler and its arguments: an edit of any of them makes a new library,
-and what is there is never changed.
+The cache is keyed by a hash of the sources, the machine, the compiler and its arguments: an edit of any of them makes a
+new library, and what is there is never changed. (A home may be shared between machines of different kinds.)
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import ctypes
 import hashlib
 import importlib.util
 import os
+import platform
 import shlex
 import shutil
 import subprocess
@@ -164,7 +165,7 @@ def _usable(directory: Path) -> bool:
 
 
 def _key(compiler: Sequence[str]) -> str:
-    """Sources, arguments, and which compiler: by size and time of its file, ziglang by its version."""
+    """Sources, machine, arguments, and which compiler: by size and time of its file, ziglang by its version."""
     digest = hashlib.sha256(source_hash().encode())
     if "ziglang" in compiler:
         identity = metadata.version("ziglang")
@@ -174,7 +175,7 @@ def _key(compiler: Sequence[str]) -> str:
             identity = f"{status.st_size} {status.st_mtime_ns}"
         except OSError:
             identity = ""
-    digest.update("\0".join([*compiler, identity, *FLAGS, *SHARED]).encode())
+    digest.update("\0".join([platform.machine(), *compiler, identity, *FLAGS, *SHARED]).encode())
     return digest.hexdigest()[:16]
 
 

@@ -88,6 +88,13 @@ def test_another_compiler_makes_another(small: Path, tmp_path: Path, monkeypatch
     assert library.library() != before
 
 
+def test_another_kind_of_machine_makes_another(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A home may be mounted on both."""
+    before = library.library()
+    monkeypatch.setattr(library.platform, "machine", lambda: "riscv64")
+    assert library.library() != before
+
+
 def test_builds_at_the_same_time_do_not_clash(small: Path) -> None:
     with ThreadPoolExecutor(4) as pool:
         paths = {future.result() for future in [pool.submit(library.library) for _ in range(4)]}
