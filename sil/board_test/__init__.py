@@ -17,7 +17,7 @@ from sil.board_test.outcome import FAIL, PASS, SKIPPED, Failed, Silent, Skipped
 from sil.doctor.findings import Finding
 from sil.plugins import load
 from sil.scenario_errors import one_of
-from sil.trouble import SilError, UsageError
+from sil.trouble import EXIT_USAGE, SilError, UsageError
 
 __all__ = ["CHECKS", "FAIL", "GROUPS", "PASS", "SKIPPED", "Checked", "Order", "examine"]
 
@@ -127,6 +127,8 @@ def _reached(at: Examinee) -> Iterator[Finding]:
     except (SilError, LinkError) as error:
         if str(error).startswith("link:"):  # what is wrong is its name
             raise UsageError(f"board-test: {error}") from None
+        if at.order.launched and isinstance(error, SilError) and error.exit_code == EXIT_USAGE:
+            raise  # there is no board yet: an extra, a compiler or an emulator is missing
         yield Finding(FAIL, " ".join(str(error).split()), check="open")
 
 

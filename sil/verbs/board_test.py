@@ -121,7 +121,8 @@ def board_test(
     Ends the session of a board that is in one, and leaves it without any. Does not touch a port that another process
     has open. At 115200 baud it takes about two minutes.
 
-    Exit codes: 0 every check passed or was skipped, 2 usage, 3 a check failed or there is no board, 130 interrupted.
+    Exit codes: 0 every check passed or was skipped, 2 usage, or what a board of ours needs is not installed, 3 a check
+    failed or there is no board, 130 interrupted.
 
     Examples: sil board-test /dev/ttyUSB0 --reset | sil board-test udp://192.168.7.2:5005 --skip timer |
     sil board-test 'serial:///dev/ttyACM0?baud=460800' --junit board.xml |

@@ -106,16 +106,15 @@ def test_replay_of_a_float_law_is_refused(cli: Cli) -> None:
     assert "expected fixed for board cortex-m" in err
 
 
-def test_without_unicorn_a_run_says_what_to_install(cli: Cli) -> None:
+@pytest.mark.parametrize("words", [("run", "pd-root-locus", "--board", "cortex-m"), ("board-test", "cortex-m")])
+def test_without_unicorn_a_verb_says_what_to_install(cli: Cli, words: tuple[str, ...]) -> None:
     package = cli.folder / "path" / "unicorn"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("raise ImportError('not here')\n")
-    process = cli.start(
-        "run", "pd-root-locus", "--board", "cortex-m", env={**os.environ, "PYTHONPATH": str(package.parent)}
-    )
+    process = cli.start(*words, env={**os.environ, "PYTHONPATH": str(package.parent)})
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out, err) == (2, "", NEEDS + "\n")
-    assert list((cli.folder / "runs").iterdir()) == [], "nothing was run, nothing is left"
+    assert not list((cli.folder / "runs").glob("*")), "nothing was run, nothing is left"
 
 
 def test_an_image_of_another_layout_is_refused_with_the_remedy(cli: Cli) -> None:
