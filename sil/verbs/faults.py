@@ -11,8 +11,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, EXIT_REQUIREMENT, UsageError
-from sil.verbs import completion
-from sil.verbs.options import JsonOption, QuietOption, SetOption, print_json
+from sil.verbs.options import (
+    SWEEP_PANEL,
+    JobsOption,
+    JsonOption,
+    QuietOption,
+    ResumeOption,
+    SetOption,
+    SweptArgument,
+    print_json,
+    resumed,
+)
 from sil.verbs.sweep import base_of, interruptible
 
 if TYPE_CHECKING:
@@ -23,20 +32,12 @@ if TYPE_CHECKING:
     from sil.scenario import Scenario
 
 MAP_PANEL = "What the map is over"
-SWEEP_PANEL = "How it goes on"
 START_TICKS = 20
 MOST_TICKS = 100
 
 
 def faults(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="Built-in name (see `sil scenarios`) or YAML file; none with --resume.",
-            autocompletion=completion.scenarios,
-        ),
-    ] = None,
+    scenario: SweptArgument = None,
     law: Annotated[
         list[str] | None,
         typer.Option(
@@ -86,22 +87,8 @@ def faults(
         ),
     ] = 5,
     set_: SetOption = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            "-j",
-            metavar="N",
-            help="Worker processes. Default: one for each CPU.",
-            rich_help_panel=SWEEP_PANEL,
-        ),
-    ] = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option(
-            "--resume", metavar="DIR", help="Go on with the map in this directory.", rich_help_panel=SWEEP_PANEL
-        ),
-    ] = None,
+    jobs: JobsOption = None,
+    resume: ResumeOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -134,9 +121,10 @@ def faults(
 
     workers = checked_workers(jobs)
     if resume is not None:
+        directory = resumed(resume)
         if scenario is not None or law or set_ or out:
             raise UsageError(f"--resume: expected no scenario or keys beside it: {resume}/plan.json says them all")
-        return interruptible(lambda: _fly(_known(old_sweep(resume)), workers, as_json, quiet))
+        return interruptible(lambda: _fly(_known(old_sweep(directory)), workers, as_json, quiet))
     if scenario is None:
         raise UsageError("faults: expected SCENARIO, or --resume DIR, got neither")
     base = _base(scenario, set_ or [])

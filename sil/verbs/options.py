@@ -20,6 +20,7 @@ KEYS_PANEL = "Keys of the scenario"
 MACHINE_PANEL = "What the machine grants"
 RESULT_PANEL = "Results"
 LIVE_PANEL = "Live view"
+SWEEP_PANEL = "How the sweep goes on"
 LIVE_AT = "127.0.0.1:8765"  # where viewers look first
 
 ScenarioArgument = Annotated[
@@ -27,6 +28,14 @@ ScenarioArgument = Annotated[
     typer.Argument(
         metavar="SCENARIO",
         help="Built-in name (see `sil scenarios`) or YAML file.",
+        autocompletion=completion.scenarios,
+    ),
+]
+SweptArgument = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="SCENARIO",
+        help="Built-in name (see `sil scenarios`) or YAML file; none with --resume.",
         autocompletion=completion.scenarios,
     ),
 ]
@@ -92,6 +101,25 @@ CpusOption = Annotated[
         metavar="LAB,BOARD",
         help="CPU of the laboratory, CPU of the board, such as 0,1; short for clock.lab_cpu and clock.board_cpu.",
         rich_help_panel=MACHINE_PANEL,
+    ),
+]
+JobsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        "-j",
+        metavar="N",
+        help="Worker processes. Default: one for each CPU; one alone where the clock is not lockstep.",
+        rich_help_panel=SWEEP_PANEL,
+    ),
+]
+ResumeOption = Annotated[
+    str | None,
+    typer.Option(
+        "--resume",
+        metavar="DIR",
+        help="Go on with what is in this directory; its plan says what is varied.",
+        rich_help_panel=SWEEP_PANEL,
     ),
 ]
 OutOption = Annotated[
@@ -198,6 +226,13 @@ def address(option: str, text: str) -> tuple[str, int]:
     if not host or not port.isdecimal() or int(port) > 65535:
         raise UsageError(f"{option}: expected HOST:PORT such as {LIVE_AT}, port 0 to 65535, got {text!r}")
     return host.removeprefix("[").removesuffix("]"), int(port)
+
+
+def resumed(directory: str) -> Path:
+    """--resume. Raises UsageError."""
+    if not directory:
+        raise UsageError("--resume: expected the directory of a sweep, got an empty text")
+    return Path(directory)
 
 
 def variant_sets(variant: str | None) -> list[str]:

@@ -15,13 +15,18 @@ from sil.verbs import completion
 from sil.verbs.options import (
     KEYS_PANEL,
     RESULT_PANEL,
+    SWEEP_PANEL,
     ClockOption,
+    JobsOption,
     JsonOption,
     LinkOption,
     QuietOption,
+    ResumeOption,
     SetOption,
+    SweptArgument,
     VariantOption,
     print_json,
+    resumed,
     scenario_from,
     variant_sets,
 )
@@ -32,7 +37,6 @@ if TYPE_CHECKING:
     from sil.scenario import Scenario
 
 VARY_PANEL = "What is varied"
-SWEEP_PANEL = "How the sweep goes on"
 KEEP = ("none", "on-fail", "all")
 
 
@@ -48,14 +52,7 @@ class Manner(NamedTuple):
 
 
 def sweep(
-    scenario: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="SCENARIO",
-            help="Built-in name (see `sil scenarios`) or YAML file; none with --resume.",
-            autocompletion=completion.scenarios,
-        ),
-    ] = None,
+    scenario: SweptArgument = None,
     vary: Annotated[
         list[str] | None,
         typer.Option(
@@ -112,25 +109,8 @@ def sweep(
             autocompletion=completion.boards,
         ),
     ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            "-j",
-            metavar="N",
-            help="Worker processes. Default: one for each CPU; one alone where the clock is not lockstep.",
-            rich_help_panel=SWEEP_PANEL,
-        ),
-    ] = None,
-    resume: Annotated[
-        str | None,
-        typer.Option(
-            "--resume",
-            metavar="DIR",
-            help="Go on with the sweep in this directory; its plan says what is varied.",
-            rich_help_panel=SWEEP_PANEL,
-        ),
-    ] = None,
+    jobs: JobsOption = None,
+    resume: ResumeOption = None,
     retry_failed: Annotated[
         bool,
         typer.Option(
@@ -202,8 +182,7 @@ def sweep(
         checked_workers(jobs), "all" if again else keep or "none", as_json, quiet, tuple(again or ()), retry_failed
     )
     if resume is not None:
-        if not resume:
-            raise UsageError("--resume: expected the directory of a sweep, got an empty text")
+        directory = resumed(resume)
         if (
             scenario is not None
             or any((vary, vary_file, draws, sample, set_, variant, clock, link, board, out))
@@ -212,7 +191,6 @@ def sweep(
             raise UsageError(
                 f"--resume: expected neither scenario nor keys beside it: {resume}/plan.json says them all"
             )
-        directory = Path(resume)
         return interruptible(lambda: _fly(old_sweep(directory, retry_failed), manner))
     if retry_failed or again:
         raise UsageError("--retry-failed, --again: expected --resume DIR beside it, got none")

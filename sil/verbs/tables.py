@@ -12,14 +12,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sil.trouble import EXIT_INTERRUPTED, EXIT_LINK, EXIT_OK, UsageError
-from sil.verbs.options import RESULT_PANEL, JsonOption, QuietOption, print_json
+from sil.verbs.options import RESULT_PANEL, JobsOption, JsonOption, QuietOption, print_json
 from sil.verbs.sweep import base_of, interruptible, watch_of
 
 if TYPE_CHECKING:
     from sil.campaign.tables import Row
 
 STUDIES = ("000",)
-SWEEP_PANEL = "Sweep"
 
 
 def tables(
@@ -31,16 +30,7 @@ def tables(
     comparison: Annotated[
         bool, typer.Option("--comparison", help="The study's comparison of tuned laws, and their largest delays.")
     ] = False,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            "-j",
-            metavar="N",
-            help="Worker processes. Default: one for each CPU.",
-            rich_help_panel=SWEEP_PANEL,
-        ),
-    ] = None,
+    jobs: JobsOption = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -147,10 +137,14 @@ def _show(name: str, rows: Sequence[Row]) -> None:
     for header in (first, "law", "delay s", "printed", "ours", "ratio", "verdict", "why"):
         shown.add_column(header)
     for row in rows:
-        where = "" if name == row.table else row.table
         figures = (_figures(values) for values in (row.published, row.ours, row.ratio))
-        shown.add_row(where, row.law, f"{row.delay_s:g}", *figures, row.verdict, row.why)
+        shown.add_row(_manoeuvre(name, row), row.law, f"{row.delay_s:g}", *figures, row.verdict, row.why)
     Console(highlight=False, emoji=False).print(shown)
+
+
+def _manoeuvre(name: str, row: Row) -> str:
+    """What the comparison flies; a table of the study has one manoeuvre."""
+    return "" if name == row.table else row.table
 
 
 def _figures(values: Sequence[float | None]) -> str:
@@ -167,8 +161,8 @@ def _write_csv(file: Path, all_rows: dict[str, list[Row]]) -> None:
 
     with beside(file) as new, new.open("w", encoding="utf-8", newline="") as handle:
         writer = csv.writer(handle, lineterminator="\n")
-        writer.writerow(("what", "table", "law", "delay_s", "published", "ours", "ratio", "verdict", "why"))
+        writer.writerow(("table", "manoeuvre", "law", "delay_s", "published", "ours", "ratio", "verdict", "why"))
         for name, rows in all_rows.items():
             for row in rows:
                 figures = (_figures(values) for values in (row.published, row.ours, row.ratio))
-                writer.writerow((name, row.table, row.law, row.delay_s, *figures, row.verdict, row.why))
+                writer.writerow((name, _manoeuvre(name, row), row.law, row.delay_s, *figures, row.verdict, row.why))
