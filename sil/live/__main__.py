@@ -178,11 +178,17 @@ def _options() -> argparse.Namespace:
 
 
 def _stay_out_of_the_way(cpus: str) -> None:
-    """Before the library starts its threads: they inherit it."""
+    """Before the library starts its threads: they inherit it. A wake-up of SCHED_BATCH preempts nobody. Where the
+    kernel weighs sessions first (autogroup), this session, which is ours alone, has to be nice as well.
+    """
     with suppress(OSError):
         os.nice(NICE)
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
         if cpus:
             os.sched_setaffinity(0, {int(cpu) for cpu in cpus.split(",")})
+    with suppress(OSError):
+        if os.getsid(0) == os.getpid():
+            Path("/proc/self/autogroup").write_text(str(NICE), encoding="ascii")
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from foxglove.websocket import Capability, ChannelView, Client, ServerListener
 BACKLOG = 1024  # messages a viewer: about two seconds at full rate, 0.3 MB
 KEPT_TOPIC = "/scene"  # written when it changes only: the last one is repeated for who comes later
 MOST_ERRORS = 20  # lines about viewers that send nonsense
-SUBSCRIBES_S = 0.3
+SUBSCRIBES_S = 1.0  # on a busy machine
 CLOSES_S = 1.0  # viewers that read get their goodbye within this time
 VIEWER = "viewer"  # said on stdout when the first one has subscribed to something
 
