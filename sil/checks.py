@@ -8,42 +8,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
-from typing import Literal, NamedTuple
 
-from protocol import codec, frames
-from protocol.channel import wire_time_ns
 from protocol.config import MAX_WORDS
-from protocol.law_tables import TELEMETRY_COMMON, ConfigError, refusal
+from protocol.law_tables import ConfigError, refusal
 from protocol.laws import IN_C
 from sil import scenario_law as laws
 from sil.boards import FIRMWARE, WITHOUT_TIMER
+from sil.check_deadlines import deadline
+from sil.check_findings import Finding, error, finding, problem_at, warning
 from sil.configure import Orders, orders
 from sil.instruments import ages_s
 from sil.scenario import Scenario, load_scenario
-from sil.scenario_errors import Problem, ScenarioInvalid, Where, shown
+from sil.scenario_errors import ScenarioInvalid, shown
 from sil.scenario_events import RESTART
 from sil.schedule import read_schedule
 from sil.sensors import SENSORS
 
-Severity = Literal["error", "warning"]
 ENDS_FOR_GOOD = ("process", "inproc", "native")  # boards without a reset of their own
+USUAL_TORQUE_Nm = 0.1  # of wheels without a limit
+COARSE = 1 / 500  # of the torque limit: what a step of the momentum may look like before it shows in the pointing
 READY_AGAIN_S = 0.25  # the Python board takes 0.1 s
+TO_REFERENCE = ("rms_error_deg", "peak_error_deg", "residual_error_deg")
 ANGLES = ("roll", "pitch", "yaw")
-
-
-class Finding(NamedTuple):
-    """One line of `sil check`."""
-
-    severity: Severity
-    where: str
-    key: str
-    line: int  # 0: not from a file
-    expected: str
-    got: str
-
-    def __str__(self) -> str:
-        text = str(Problem(self.where, self.key, self.expected, self.got, self.line))
-        return f"warning: {text}" if self.severity == "warning" else text
 
 
 def check_scenario(
@@ -52,8 +38,8 @@ def check_scenario(
     """Load and check; a scenario that cannot be loaded is a list of errors, too."""
     try:
         return check(load_scenario(name_or_path, sets, user_table))
-    except ScenarioInvalid as error:
-        return [_finding("error", problem) for problem in error.problems]
+    except ScenarioInvalid as invalid:
+        return [finding("error", problem) for problem in invalid.problems]
 
 
 def check(scenario: Scenario) -> list[Finding]:
@@ -67,16 +53,17 @@ def check(scenario: Scenario) -> list[Finding]:
             _law,
             _sensors,
             _old_readings,
+            _unknown_reference,
             _clock,
-            _deadline,
+            deadline,
             _lateness_limit,
             _restarts,
             _planned_restarts,
             *checks,
             _manoeuvre,
         ]
-    found = [finding for each in checks for finding in each(scenario)]
-    return sorted(found, key=lambda finding: finding.severity != "error")
+    found = [one for each in checks for one in each(scenario)]
+    return sorted(found, key=lambda one: one.severity != "error")
 
 
 # -- errors -----------------------------------------------------------------------------------------------------------
@@ -90,15 +77,15 @@ def firmware_flies(scenario: Scenario) -> Iterator[Finding]:
     if (law := scenario.law.name) not in IN_C:
         others = "flies yours" if laws.is_user_law(law) else "has the others"
         expected = f"{', '.join(sorted(IN_C))} for board {board}, the laws in C (board process {others})"
-        yield _error(scenario, "law.name", expected, shown(law))
+        yield error(scenario, "law.name", expected, shown(law))
     elif scenario.law.form != "fixed":
         expected = f"fixed for board {board}, the firmware's arithmetic (board process has both)"
-        yield _error(scenario, "law.form", expected, scenario.law.form)
+        yield error(scenario, "law.form", expected, scenario.law.form)
     if url == "inproc" or url.startswith("serial:"):
-        yield _error(scenario, "link.url", f"pty or udp for board {board}, a process of this machine", shown(url))
+        yield error(scenario, "link.url", f"pty or udp for board {board}, a process of this machine", shown(url))
     if board in WITHOUT_TIMER and scenario.clock.mode != "lockstep":
         expected = f"lockstep for board {board}, which has no timer of its own (board native has one)"
-        yield _error(scenario, "clock", expected, scenario.clock.mode)
+        yield error(scenario, "clock", expected, scenario.clock.mode)
 
 
 def _law(scenario: Scenario) -> Iterator[Finding]:
@@ -106,50 +93,62 @@ def _law(scenario: Scenario) -> Iterator[Finding]:
     table = scenario.law_table
     try:
         made = orders(scenario)
-    except ConfigError as error:
-        yield _error(scenario, "law.params", "values that fit the words of CONFIG", str(error))
+    except ConfigError as refused:
+        yield error(scenario, "law.params", "values that fit the words of CONFIG", str(refused))
         return
     if len(made.words) > MAX_WORDS:
         got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
-        yield _error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
+        yield error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
     found = [*_law_form(scenario), *_law_period(scenario), *_law_delay(scenario), *_law_momentum(scenario, made)]
     yield from found
     reason = refusal(made.configuration)
     if reason is not None and not found:
-        yield _error(scenario, "law.name", f"a configuration that law {table.name} admits", reason)
+        yield error(scenario, "law.name", f"a configuration that law {table.name} admits", reason)
 
 
 def _law_form(scenario: Scenario) -> Iterator[Finding]:
     if scenario.law_table.float_only and scenario.law.form != "float":
-        yield _error(scenario, "law.form", f"float for law {scenario.law.name}", scenario.law.form)
+        yield error(scenario, "law.form", f"float for law {scenario.law.name}", scenario.law.form)
 
 
 def _law_period(scenario: Scenario) -> Iterator[Finding]:
     low, high = scenario.law_table.period_s
     if not low <= scenario.period_s <= high:
         expected = f"a number in s from {low:g} to {high:g} for law {scenario.law.name}"
-        yield _error(scenario, "period_s", expected, shown(scenario.period_s))
+        yield error(scenario, "period_s", expected, shown(scenario.period_s))
 
 
 def _law_momentum(scenario: Scenario, made: Orders) -> Iterator[Finding]:
-    """A law that reads in the wheels' momentum what torque acted would read there that thrusters never do anything."""
-    if scenario.actuators.kind != "wheels" and made.configuration.params.get("recover_torque"):
+    """A law that reads in the wheels' momentum what torque acted would read there that thrusters never do anything.
+
+    And of wheels a torque as large as one step of that momentum.
+    """
+    if not made.configuration.params.get("recover_torque"):
+        return
+    if scenario.actuators.kind != "wheels":
         expected = f"false with actuators.kind {scenario.actuators.kind}, whose torque does not show in the momentum"
-        yield _error(scenario, "law.params.recover_torque", expected, "true")
+        yield error(scenario, "law.params.recover_torque", expected, "true")
+        return
+    bits, limits = scenario.wire.momentum_bits, scenario.actuators.wheels.torque_max_Nm
+    step_Nm, most_Nm = 2.0**-bits / scenario.period_s, min(limit or USUAL_TORQUE_Nm for limit in limits)
+    if step_Nm > COARSE * most_Nm:
+        least = bits + math.ceil(math.log2(step_Nm / (COARSE * most_Nm)))
+        expected = f"at least {least}: after lost SAMPLEs law {scenario.law.name} takes a step for {step_Nm:.2g} N m"
+        yield warning(scenario, "wire.momentum_bits", expected, str(bits))
 
 
 def _law_delay(scenario: Scenario) -> Iterator[Finding]:
     delays = scenario.law_variant.transport_delays
     if scenario.transport_delay_ticks not in delays:
         expected = f"{' or '.join(map(str, delays))} for law {scenario.law.name}"
-        yield _error(scenario, "transport_delay_ticks", expected, shown(scenario.transport_delay_ticks))
+        yield error(scenario, "transport_delay_ticks", expected, shown(scenario.transport_delay_ticks))
 
 
 def _sensors(scenario: Scenario) -> Iterator[Finding]:
     needs = scenario.law_variant.needs
     for bit, name in enumerate(SENSORS):
         if needs >> bit & 1 and not getattr(scenario.sensors, name).enabled:
-            yield _error(scenario, f"sensors.{name}.enabled", f"true, law {scenario.law.name} reads it", "false")
+            yield error(scenario, f"sensors.{name}.enabled", f"true, law {scenario.law.name} reads it", "false")
 
 
 def _old_readings(scenario: Scenario) -> Iterator[Finding]:
@@ -162,16 +161,31 @@ def _old_readings(scenario: Scenario) -> Iterator[Finding]:
         own = scenario.sensors.attitude.sampling.delay_s is not None
         key = f"sensors.{'attitude.' if own else ''}sampling.delay_s"
         expected = f"readings less than half a period old ({half_s:g} s), law {scenario.law.name} takes them for fresh"
-        yield _warning(scenario, key, expected, f"{mean_s:.3g} s on average")
+        yield warning(scenario, key, expected, f"{mean_s:.3g} s on average")
+
+
+def _unknown_reference(scenario: Scenario) -> Iterator[Finding]:
+    """Where a reference starts only the board knows: without TELEMETRY errors are those to the set-point."""
+    guidance = scenario.guidance
+    if scenario.telemetry_every or (guidance.reference == "none" and guidance.rate_limit_degps is None):
+        return
+    about = [index for index, line in enumerate(scenario.require) if line.metric.partition(".")[0] in TO_REFERENCE]
+    for index in about:
+        expected = "a metric that can be known with telemetry_every 0, such as rms_setpoint_error_deg"
+        place, key = scenario.where(f"require.{index}.metric"), f"require[{index}].metric"
+        yield finding("error", problem_at(place, key, expected, shown(scenario.require[index].metric)))
+    if not about:
+        expected = "1 or more: without TELEMETRY nobody knows the reference, and errors are those to the set-point"
+        yield warning(scenario, "telemetry_every", expected, "0")
 
 
 def _clock(scenario: Scenario) -> Iterator[Finding]:
     if scenario.transport_delay_ticks == 0 and scenario.clock.mode != "lockstep":
         got = f"{scenario.clock.mode} with transport_delay_ticks 0"
-        yield _error(scenario, "clock", "lockstep, where the plant waits for the answer", got)
+        yield error(scenario, "clock", "lockstep, where the plant waits for the answer", got)
     if scenario.sample_timeout_us >= scenario.period_us:
         expected = f"a number in s below the period ({scenario.period_s:g})"
-        yield _error(scenario, "sample_timeout_s", expected, shown(scenario.sample_timeout_us * 1e-6))
+        yield error(scenario, "sample_timeout_s", expected, shown(scenario.sample_timeout_us * 1e-6))
 
 
 def _lateness_limit(scenario: Scenario) -> Iterator[Finding]:
@@ -179,7 +193,7 @@ def _lateness_limit(scenario: Scenario) -> Iterator[Finding]:
     limit_ms, scale = scenario.timing.max_lateness_ms, scenario.clock_scale
     if limit_ms is not None and scale and limit_ms * 1e-3 > scenario.period_s / scale:
         most = f"at most a period on the wall ({scenario.period_s / scale * 1e3:g} ms), beyond it every tick is late"
-        yield _warning(scenario, "timing.max_lateness_ms", most, f"{limit_ms:g}")
+        yield warning(scenario, "timing.max_lateness_ms", most, f"{limit_ms:g}")
 
 
 def _restarts(scenario: Scenario) -> Iterator[Finding]:
@@ -187,7 +201,7 @@ def _restarts(scenario: Scenario) -> Iterator[Finding]:
     limit, board = scenario.restart_limit, scenario.board
     if limit and board in ENDS_FOR_GOOD and not scenario.link.url.startswith("serial:"):
         expected = "0, or a board that can restart by itself (cortex-m, qemu, serial://PATH, udp://HOST:PORT)"
-        yield _warning(scenario, "restart_limit", expected, f"{limit} with board {board}")
+        yield warning(scenario, "restart_limit", expected, f"{limit} with board {board}")
 
 
 def _planned_restarts(scenario: Scenario) -> Iterator[Finding]:
@@ -197,83 +211,7 @@ def _planned_restarts(scenario: Scenario) -> Iterator[Finding]:
         if event.do == RESTART and event.for_s is not None and scale and event.for_s / scale < READY_AGAIN_S:
             expected = f"at least {READY_AGAIN_S * scale:g} s, {READY_AGAIN_S:g} s on the wall for it to be ready"
             got, place = f"{event.for_s:g} at {scenario.clock.mode}", scenario.where(f"events.{index}.for_s")
-            yield _finding("warning", _at(place, f"events[{index}].for_s", expected, got))
-
-
-def _deadline(scenario: Scenario) -> Iterator[Finding]:
-    """SAMPLE against sample_timeout, COMMAND against n T_s: wire, delay, execution; what fits into a period."""
-    if scenario.expect_missed:
-        return
-    up_s, timeout_s = wire_times_s(scenario)[0], scenario.sample_timeout_us * 1e-6
-    delay_s = scenario.link.models()[0].delay_ns * 1e-9
-    if up_s + delay_s > timeout_s:
-        expected = f"SAMPLE within sample_timeout_s ({timeout_s:g} s), or expect_missed: true"
-        got = f"{_ms(up_s)} on the wire + {_ms(delay_s)} delay: every one is late"
-        yield _error(scenario, _said(scenario, "up", "delay_s") if delay_s > up_s else "link.baud", expected, got)
-    else:
-        yield from _command_deadline(scenario, up_s + delay_s)
-
-
-def _command_deadline(scenario: Scenario, to_board_s: float) -> Iterator[Finding]:
-    """`to_board_s`: wire and delay of SAMPLE."""
-    up_s, command_s, answer_s = wire_times_s(scenario)
-    back_s = scenario.link.models()[1].delay_ns * 1e-9
-    busy_s, period_s, n = scenario.answer_delay_s, scenario.period_s, scenario.transport_delay_ticks
-    wires_s, delays_s = up_s + answer_s, to_board_s - up_s + back_s
-    key = "answer_delay_s" if busy_s > wires_s + delays_s else "link.baud"
-    if delays_s > max(wires_s, busy_s):
-        key = _said(scenario, "down" if back_s > to_board_s - up_s else "up", "delay_s")
-    whole_s = to_board_s + busy_s + command_s + back_s
-    if n and whole_s >= n * period_s:
-        parts = f"{_ms(to_board_s)} up + {_ms(busy_s)} execution + {_ms(command_s + back_s)} down = {_ms(whole_s)}"
-        yield _error(scenario, key, f"COMMAND within {n} x {period_s:g} s, or expect_missed: true", parts)
-    elif busy_s >= period_s:
-        expected = f"a number in s below the period ({period_s:g}), or expect_missed: true"
-        yield _error(scenario, "answer_delay_s", expected, shown(busy_s))
-    elif max(up_s, answer_s) >= period_s:
-        got = f"{_ms(up_s)} up, {_ms(answer_s)} down"
-        yield _error(scenario, "link.baud", f"frames of one tick within {period_s:g} s each way", got)
-    else:
-        yield from _jitter(scenario, to_board_s, whole_s)
-
-
-def _jitter(scenario: Scenario, up_s: float, whole_s: float) -> Iterator[Finding]:
-    """Frames that are in time without jitter, and some of which are late with it."""
-    up, down = (0.0 if each.jitter is None else each.jitter.max_ns * 1e-9 for each in scenario.link.models())
-    timeout_s, n = scenario.sample_timeout_us * 1e-6, scenario.transport_delay_ticks
-    if up_s <= timeout_s < up_s + up:
-        got = f"up to {_ms(up_s + up)}: some are late"
-        yield _warning(
-            scenario, _said(scenario, "up", "jitter"), f"SAMPLE within sample_timeout_s ({timeout_s:g} s)", got
-        )
-    if n and whole_s + min(up, max(timeout_s - up_s, 0.0)) + down >= n * scenario.period_s:
-        got = f"up to {_ms(whole_s + up + down)}: some are late"
-        way = "down" if down > up else "up"
-        yield _warning(scenario, _said(scenario, way, "jitter"), f"COMMAND within {n} x {scenario.period_s:g} s", got)
-
-
-def _said(scenario: Scenario, way: str, key: str) -> str:
-    """Where this fault of one direction is said."""
-    own = getattr(getattr(scenario.link.faults, way), key) is not None
-    return f"link.faults.{way}.{key}" if own else f"link.faults.{key}"
-
-
-def wire_times_s(scenario: Scenario) -> tuple[float, float, float]:
-    """Modelled time on the wire of SAMPLE, COMMAND, and COMMAND with TELEMETRY, in s; without events."""
-    values = ((0,) * 3, (0,) * 4, (0,) * 3)
-    on = [getattr(scenario.sensors, name).enabled for name in SENSORS]
-    readings = tuple(frames.Reading(0, v) if flag else None for v, flag in zip(values, on, strict=True))
-    zero = (0, 0, 0)
-    up, down = scenario.link.models()
-    sample = _wire_s(up.baud, frames.Sample(0, zero, zero, zero, 0, 0, 0, 0, readings))  # type: ignore[arg-type]
-    command = _wire_s(down.baud, frames.Command(0, zero, 0, 0, frames.USED))
-    words = (0,) * (len(TELEMETRY_COMMON) + len(scenario.law_table.telemetry))
-    telemetry = _wire_s(down.baud, frames.Telemetry(0, 0, 0, words)) if scenario.telemetry_every else 0.0
-    return sample, command, command + telemetry
-
-
-def _wire_s(baud: int | None, frame: frames.Frame) -> float:
-    return wire_time_ns(len(codec.encode(frames.pack(frame, 0))), baud) * 1e-9
+            yield finding("warning", problem_at(place, f"events[{index}].for_s", expected, got))
 
 
 def _schedule(scenario: Scenario) -> Iterator[Finding]:
@@ -281,8 +219,8 @@ def _schedule(scenario: Scenario) -> Iterator[Finding]:
     try:
         if file is not None:
             read_schedule(file, scenario.period_s, scenario.ticks)
-    except ScenarioInvalid as error:
-        yield from (_finding("error", problem) for problem in error.problems)
+    except ScenarioInvalid as invalid:
+        yield from (finding("error", problem) for problem in invalid.problems)
 
 
 # -- warnings ---------------------------------------------------------------------------------------------------------
@@ -298,10 +236,10 @@ def _wheels(scenario: Scenario) -> Iterator[Finding]:
         )
         if speed and not inertia:
             expected = "0 without actuators.wheels.inertia_kgm2: it carries no momentum"
-            yield _warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed:g} rad/s")
+            yield warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed:g} rad/s")
         elif most is not None and abs(speed * inertia) > most:
             expected = f"a start within momentum_max_Nms ({most:g})"
-            yield _warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed * inertia:g} N m s")
+            yield warning(scenario, "actuators.wheels.initial_speed_radps", expected, f"{speed * inertia:g} N m s")
 
 
 def _noise(scenario: Scenario) -> Iterator[Finding]:
@@ -318,7 +256,7 @@ def _noise(scenario: Scenario) -> Iterator[Finding]:
     )
     for key, noise, lsb in steps:
         if 0 < noise < 0.1 * lsb:
-            yield _warning(scenario, f"sensors.{key}", f"0, or at least a tenth of the LSB ({lsb:.3g})", f"{noise:g}")
+            yield warning(scenario, f"sensors.{key}", f"0, or at least a tenth of the LSB ({lsb:.3g})", f"{noise:g}")
 
 
 def _disturbance(scenario: Scenario) -> Iterator[Finding]:
@@ -328,7 +266,7 @@ def _disturbance(scenario: Scenario) -> Iterator[Finding]:
         if most is not None and abs(torque) * scenario.duration_s > most:
             expected = f"less than momentum_max_Nms ({most:g}) over {scenario.duration_s:g} s"
             got = f"{abs(torque) * scenario.duration_s:g} N m s about axis {'xyz'[axis]}"
-            yield _warning(scenario, "plant.disturbance_Nm.constant_Nm", expected, got)
+            yield warning(scenario, "plant.disturbance_Nm.constant_Nm", expected, got)
 
 
 def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
@@ -337,21 +275,21 @@ def _manoeuvre(scenario: Scenario) -> Iterator[Finding]:
     if scenario.guidance.reference == "none":
         if scenario.guidance.accel_limit_degps2 is not None:
             got = f"{scenario.guidance.accel_limit_degps2:g}"
-            yield _warning(scenario, "guidance.accel_limit_degps2", "null, reference none has no such limit", got)
+            yield warning(scenario, "guidance.accel_limit_degps2", "null, reference none has no such limit", got)
         return
     if wn * scenario.period_s > 0.5:
         expected = f"at most {0.5 / scenario.period_s:g} rad/s, half a radian per sample"
-        yield _warning(scenario, "guidance.wn_radps", expected, shown(wn))
+        yield warning(scenario, "guidance.wn_radps", expected, shown(wn))
     for axis, step_deg in enumerate(_largest_steps_deg(scenario)):
         step, inertia = math.radians(step_deg), scenario.plant.inertia_kgm2[axis][axis]
         torque, most_torque = inertia * wn * wn * step, actuators.chosen.torque_max_Nm[axis]
         momentum, most_momentum = inertia * wn * step / math.e, actuators.momentum_max_Nms[axis]
         if most_torque is not None and torque > most_torque:
             expected = f"at least {torque:.3g} N m for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
-            yield _warning(scenario, f"actuators.{actuators.kind}.torque_max_Nm", expected, shown(most_torque))
+            yield warning(scenario, f"actuators.{actuators.kind}.torque_max_Nm", expected, shown(most_torque))
         if most_momentum is not None and momentum > most_momentum:
             expected = f"at least {momentum:.3g} N m s for {step_deg:g} deg of {ANGLES[axis]} at wn {wn:g} rad/s"
-            yield _warning(scenario, "actuators.wheels.momentum_max_Nms", expected, shown(most_momentum))
+            yield warning(scenario, "actuators.wheels.momentum_max_Nms", expected, shown(most_momentum))
 
 
 def _largest_steps_deg(scenario: Scenario) -> list[float]:
@@ -364,26 +302,3 @@ def _largest_steps_deg(scenario: Scenario) -> list[float]:
         del points[1]
     pairs = list(pairwise(points))
     return [max((abs(after[axis] - before[axis]) for before, after in pairs), default=0.0) for axis in range(3)]
-
-
-# -- findings ---------------------------------------------------------------------------------------------------------
-
-
-def _ms(time_s: float) -> str:
-    return f"{time_s * 1e3:.3g} ms"
-
-
-def _error(scenario: Scenario, key: str, expected: str, got: str) -> Finding:
-    return _finding("error", _at(scenario.where(key), key, expected, got))
-
-
-def _warning(scenario: Scenario, key: str, expected: str, got: str) -> Finding:
-    return _finding("warning", _at(scenario.where(key), key, expected, got))
-
-
-def _at(place: Where, key: str, expected: str, got: str) -> Problem:
-    return Problem(str(place), key, expected, got, place.line)
-
-
-def _finding(severity: Severity, problem: Problem) -> Finding:
-    return Finding(severity, problem.where, problem.key, problem.line, problem.expected, problem.got)

@@ -92,7 +92,7 @@ class Scenario(Section):
     answer_delay_s: Annotated[float, Field(ge=0, le=60)] = 0.0
     """Execution model: how long the board is busy with one step."""
     telemetry_every: Annotated[int, Field(ge=0, le=1_000_000)] = 1
-    """TELEMETRY in every so many ticks; 0: never"""
+    """TELEMETRY in every so many ticks; 0: never, and then only the board knows where its reference model is"""
     expect_missed: bool = False
     """True: this scenario is meant to miss its deadlines, `sil check` accepts it."""
     events: tuple[Event, ...] = ()

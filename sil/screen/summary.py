@@ -62,8 +62,10 @@ def _errors_and_torques(summary: Mapping[str, Any]) -> Table:
     for name in ("", *AXES, ""):
         table.add_column(name, justify="left" if not name else "right")
     errors = summary["board"] != "none"  # without a board nobody follows a reference
-    for key, label, unit, scale in ROWS:
+    known = summary["metrics"].get("reference_mismatch_deg") is not None  # else nobody knows the reference
+    for key, label, unit, scale in ROWS if known else (row for row in ROWS if row[0] != "rms_setpoint_error_deg"):
         values = summary["metrics"].get(key)
+        label = label if known else label.replace("to reference", "to set-point")
         if (errors or "error" not in key) and any(value is not None for value in values or ()):
             table.add_row(label, *(_number(value, scale) for value in values), unit)
     return table

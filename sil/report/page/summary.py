@@ -11,7 +11,7 @@ import yaml
 
 from protocol import events
 from protocol.events import name_of
-from sil.metrics import NEVER_SETTLED, SETTLING, judge, measure
+from sil.metrics import MISMATCH, NEVER_SETTLED, SETTLING, judge, measure
 from sil.plain import flat, plain
 from sil.report.facts import law_of
 from sil.report.page.link import between
@@ -101,10 +101,13 @@ def _metrics(run: Run, metrics: Mapping[str, Any]) -> list[list[Any]]:
     """[[name, unit, [roll, pitch, yaw]], ...]; numbers without axes are repeated in none of them."""
     rows: list[list[Any]] = []
     unsaid = () if controlled(run) else _OF_A_LAW
+    known = metrics.get(MISMATCH) is not None
+    unsaid += () if known else ("rms_setpoint_error_deg",)
     unsaid += ("peak_momentum_Nms",) if without_wheels(run) else ()
     for name, words, unit, factor in _METRICS:
         values = metrics.get(name)
         if isinstance(values, list | tuple) and name not in unsaid:
+            words = words if known else words.replace("to reference", "to set-point")
             rows.append([words, unit, [_metric(name, value, factor) for value in values]])
     diverged = metrics.get("diverged_at_s")
     if diverged is not None:

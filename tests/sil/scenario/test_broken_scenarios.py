@@ -6,13 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from sil.checks import Finding, check_scenario
+from sil.check_findings import Finding
+from sil.checks import check_scenario
 
 # name: (scenario, key, line, expected, got), the last two as parts of the text
 BROKEN: dict[str, tuple[str, str, int, str, str]] = {
     "misspelt key": (
         "seed: 1\nplant:\n  inerta_kgm2: [2, 3, 3]\n",
         "plant.inerta_kgm2", 3, "did you mean inertia_kgm2?", "unknown key",
+    ),
+    "a requirement on what only the board knows": (
+        "telemetry_every: 0\nrequire:\n  - {metric: peak_error_deg.max, below: 1}\n",
+        "require[0].metric", 3, "a metric that can be known with telemetry_every 0", "'peak_error_deg.max'",
     ),
     "misspelt section": ("actuator: {}\n", "actuator", 1, "did you mean actuators?", "unknown key"),
     "unit in the value": ("period_s: 500 ms\n", "period_s", 1, "a number in s", "'500 ms'"),
@@ -236,6 +241,8 @@ WARNINGS = {
     "a limit beyond the period": (
         "clock: scaled:20\ntiming: {max_lateness_ms: 100}", "timing.max_lateness_ms",
     ),
+    "a reference that nobody knows": ("telemetry_every: 0", "telemetry_every"),
+    "momentum too coarse to read a torque in": ("law: {name: appc}\nwire: {momentum_bits: 13}", "wire.momentum_bits"),
     "restarts of a board that nobody starts again": ("restart_limit: 2", "restart_limit"),
     "reference too fast to sample": (
         "guidance: {wn_radps: 1.5, profile: hold}\nplant: {initial: {attitude_deg: [0, 0, 0]}}", "guidance.wn_radps",

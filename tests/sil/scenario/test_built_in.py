@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sil.checks import check, wire_times_s
+from sil.check_deadlines import wire_times_s
+from sil.checks import check
 from sil.configure import orders
 from sil.plants.rigid import Rigid
 from sil.profiles import PROFILES, setpoints

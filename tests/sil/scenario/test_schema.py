@@ -29,6 +29,7 @@ VALIDATOR = Draft7Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 
 # What a schema of one file cannot know: other keys, other files, arithmetic. The loader and `sil check` do.
 BEYOND_A_SCHEMA = {
+    "a requirement on what only the board knows",
     "period of no whole number of us", "duration of no whole number of ticks", "key given twice",
     "broken YAML", "list at the top", "user law without its file", "steps out of order", "impossible inertia",
     "inertia not symmetric",
