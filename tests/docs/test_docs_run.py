@@ -119,17 +119,20 @@ def files_of(document: str, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def first_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run that the quick start leaves."""
-    folder = tmp_path_factory.mktemp("first")
-    shell("sil run mrac-rs232", folder)
-    return folder / "runs"
+def readme_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """The README's first command without its installation; in lockstep, which it says gives the same bytes."""
+    folder = tmp_path_factory.mktemp("readme")
+    install, run = readme_commands()[0].split(" && ")
+    assert install == "pip install ."
+    return folder, shell(run.replace("scaled:20", "lockstep"), folder)
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_the_pages_commands_run_exit_and_print_as_they_say(page: str, tmp_path: Path, first_run: Path) -> None:
+def test_the_pages_commands_run_exit_and_print_as_they_say(
+    page: str, tmp_path: Path, readme_run: tuple[Path, str]
+) -> None:
     if page != "docs/quick-start.md":
-        shutil.copytree(first_run, tmp_path / "runs")
+        shutil.copytree(readme_run[0] / "runs", tmp_path / "runs")
     files_of(page, tmp_path)
     printed = ""
     for block in blocks(page):
@@ -217,15 +220,6 @@ def test_the_examples_are_shown_as_they_are_and_a_strangers_law_has_25_lines() -
 
 
 # -- the README ----------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def readme_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The README's first command without its installation; in lockstep, which it says gives the same bytes."""
-    folder = tmp_path_factory.mktemp("readme")
-    install, run = readme_commands()[0].split(" && ")
-    assert install == "pip install ."
-    return folder, shell(run.replace("scaled:20", "lockstep"), folder)
 
 
 def readme_commands() -> list[str]:
