@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
@@ -48,6 +49,7 @@ class LawTable(NamedTuple):
     finite_in_fixed: tuple[str, ...] = ()  # words that may say "no limit" in the float form only
     has_model: bool = True  # without a reading it propagates its model; else it repeats its last command
     float_only: bool = False  # there is no fixed form
+    fixed_most_Nm: float = math.inf  # the fixed form has no larger torque
     only_321: str = ""  # word that, where it is not 0, makes this a law for 3-2-1 angles only; law_id: always
     arrays: Mapping[str, tuple[str, ...]] = {}  # lists and matrices by name: the size, by name, in each direction
     sizes: Mapping[str, int] = {}  # the largest value of each size; what is smaller is filled up with zeros

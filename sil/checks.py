@@ -100,7 +100,7 @@ def _law(scenario: Scenario) -> Iterator[Finding]:
         got = f"{len(made.words)} with {len(made.configuration.rows)} set-points"
         yield error(scenario, "guidance.profile", f"at most {MAX_WORDS} words of CONFIG", got)
     found = [*_law_form(scenario), *_law_period(scenario), *_law_delay(scenario), *_law_momentum(scenario, made)]
-    yield from found
+    yield from (*found, *_law_torque(scenario))
     reason = refusal(made.configuration)
     if reason is not None and not found:
         yield error(scenario, "law.name", f"a configuration that law {table.name} admits", reason)
@@ -116,6 +116,14 @@ def _law_period(scenario: Scenario) -> Iterator[Finding]:
     if not low <= scenario.period_s <= high:
         expected = f"a number in s from {low:g} to {high:g} for law {scenario.law.name}"
         yield error(scenario, "period_s", expected, shown(scenario.period_s))
+
+
+def _law_torque(scenario: Scenario) -> Iterator[Finding]:
+    """More than a law's registers hold is no torque that it can ask for."""
+    most, key = scenario.law_table.fixed_most_Nm, f"actuators.{scenario.actuators.kind}.torque_max_Nm"
+    if scenario.law.form == "fixed" and (scenario.actuators.largest_on_the_wire or 0.0) > most:
+        expected = f"at most {most:g} N m, all that law {scenario.law.name} can ask for in its fixed form"
+        yield warning(scenario, key, expected, f"{scenario.actuators.largest_on_the_wire:.3g} N m")
 
 
 def _law_momentum(scenario: Scenario, made: Orders) -> Iterator[Finding]:

@@ -26,6 +26,7 @@ APPC = LawTable(
     ),
     transport_delays=(1,),
     period_s=(0.2, 1.0),
+    fixed_most_Nm=8.0,  # Q28
     reference_leads=(2,),
     needs=READ_EULER,
     only_321="law_id",  # always: it predicts and steers in Euler angles 3-2-1

@@ -33,6 +33,7 @@ MRAC = LawTable(
     ),
     transport_delays=(0, 1),
     period_s=(0.2, 1.0),
+    fixed_most_Nm=8.0,  # Q28
     reference_leads=(2, 1),
     needs=READ_EULER,
     variant_word="design",

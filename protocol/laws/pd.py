@@ -23,6 +23,7 @@ PD = LawTable(
     telemetry=vector("error", "2^-32 turn", 0, -(2**31), INT32_MAX, (0, 0, 0), "ym(k) - y(k), or what error says"),
     transport_delays=(0, 1, 2, 3, 4),
     period_s=(0.001, 10.0),
+    fixed_most_Nm=8.0,  # Q28
     reference_leads=(2, 1),
     needs=READ_EULER,
     has_model=False,

@@ -100,7 +100,7 @@ def _required(run: Run, metrics: Mapping[str, Any]) -> list[dict[str, Any]]:
 def _metrics(run: Run, metrics: Mapping[str, Any]) -> list[list[Any]]:
     """[[name, unit, [roll, pitch, yaw]], ...]; numbers without axes are repeated in none of them."""
     rows: list[list[Any]] = []
-    unsaid = () if controlled(run) else _OF_A_LAW
+    unsaid: tuple[str, ...] = () if controlled(run) else _OF_A_LAW
     known = metrics.get(MISMATCH) is not None
     unsaid += () if known else ("rms_setpoint_error_deg",)
     unsaid += ("peak_momentum_Nms",) if without_wheels(run) else ()

@@ -242,6 +242,9 @@ WARNINGS = {
         "clock: scaled:20\ntiming: {max_lateness_ms: 100}", "timing.max_lateness_ms",
     ),
     "a reference that nobody knows": ("telemetry_every: 0", "telemetry_every"),
+    "more torque than a law has registers for": (
+        "actuators: {wheels: {torque_max_Nm: 20}}", "actuators.wheels.torque_max_Nm",
+    ),
     "momentum too coarse to read a torque in": ("law: {name: appc}\nwire: {momentum_bits: 13}", "wire.momentum_bits"),
     "restarts of a board that nobody starts again": ("restart_limit: 2", "restart_limit"),
     "reference too fast to sample": (
