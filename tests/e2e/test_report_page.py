@@ -20,7 +20,7 @@ from sil.runner import run_scenario
 from sil.scenario import load_scenario
 from tools.browser import Browser, program
 
-DESKTOP, PHONE = (1400, 900), (390, 844)
+DESKTOP, PHONE, SMALL_PHONE = (1400, 900), (390, 844), (320, 700)
 READY_MS = 1000.0  # what the page may take until it can be used, by the browser's own clock
 POINTED = {  # angles (roll, pitch, yaw) in deg, and where x, y, z of the body point in the reference frame then
     "roll": ((90, 0, 0), (1, 0, 0), (0, 0, 1), (0, -1, 0)),
@@ -70,7 +70,7 @@ def pages(folder: Path) -> dict[str, Path]:
         ("clean", PHONE, True),
         ("faulty", PHONE, False),
         ("both", DESKTOP, True),
-        ("both", PHONE, False),
+        ("both", SMALL_PHONE, False),
     ],
 )
 def test_no_complaint_no_request_no_sideways(
