@@ -114,7 +114,10 @@ def glover(
     gamma: Annotated[
         float,
         typer.Option(
-            "--gamma", metavar="X", help="gamma as a multiple of the least, 1.0001 to 100.", rich_help_panel=DESIGN_PANEL
+            "--gamma",
+            metavar="X",
+            help="gamma as a multiple of the least, 1.0001 to 100.",
+            rich_help_panel=DESIGN_PANEL,
         ),
     ] = 1.1,
     integral: IntegralOption = 0.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -11,6 +12,7 @@ from sil.campaign import tables
 from sil.campaign.plan import Plan, Point
 from sil.campaign.records import Record
 from sil.scenario import load_scenario
+from sil.verbs.tables import _write_csv
 
 
 def record(number: int, rms: tuple[float, float, float], exit_code: int = 0) -> Record:
@@ -29,6 +31,15 @@ def record(number: int, rms: tuple[float, float, float], exit_code: int = 0) -> 
 )
 def test_verdicts(printed: tuple[float, float, float], ours: tuple[float, float, float], verdict: str) -> None:
     assert tables._verdict(study.Printed("pd", 0.0, printed), ours) == verdict
+
+
+def test_the_csv_says_table_and_manoeuvre_and_neither_twice(tmp_path: Path) -> None:
+    figures = ((1.0, None), (1.1, 2.0), (1.1, None))
+    rows = [tables.Row(name, "pd", 0.2, *figures, "reproduced", "") for name in ("5.7", "train")]
+    _write_csv(tmp_path / "t.csv", {"5.7": rows[:1], "comparison": rows[1:]})
+    head, *lines = (tmp_path / "t.csv").read_text().splitlines()
+    assert head == "table,manoeuvre,law,delay_s,published,ours,ratio,verdict,why"
+    assert lines == ["5.7,,pd,0.2,1 -,1.1 2,1.1 -,reproduced,", "comparison,train,pd,0.2,1 -,1.1 2,1.1 -,reproduced,"]
 
 
 def test_a_run_that_failed_is_not_flown_and_one_that_is_missing_has_no_row() -> None:
