@@ -49,6 +49,8 @@ class EventKind(NamedTuple):
 
 
 _INSTRUMENT = "of (0 attitude sensor, 1 star tracker, 2 gyros, 3 wheels, 4 thrusters)"
+_AXES = "axes (1 x, 2 y, 3 x y, 4 z, 5 x z, 6 y z, 7 x y z)"
+_BEGAN = "when (0 on the way, 1 at the start)"
 _FAULT = "kind (0 off, 1 stuck, 2 garbage, 3 wrong, 4 slow, 5 delayed, 6 intermittent)"
 
 _KINDS = (
@@ -58,9 +60,7 @@ _KINDS = (
     EventKind(RESTARTED, "RESTARTED", "too far ahead: bumpless re-start", "tick expected", "tick that came"),
     EventKind(WATCHDOG_ON, "WATCHDOG_ON", "link watchdog: torque is zero from here", "tick", "ticks without a SAMPLE"),
     EventKind(WATCHDOG_OFF, "WATCHDOG_OFF", "a SAMPLE came: the law commands again", "tick", ""),
-    EventKind(
-        REFERENCE_RESTART, "REFERENCE_RESTART", "reference model began anew", "axis mask, bit 0 = x", "1 at the start"
-    ),
+    EventKind(REFERENCE_RESTART, "REFERENCE_RESTART", "reference model began anew", _AXES, _BEGAN),
     EventKind(
         ARITHMETIC_SATURATION,
         "ARITHMETIC_SATURATION",

@@ -13,9 +13,9 @@ import time
 from pathlib import Path
 
 import pytest
+from live_viewers import Viewer, address_of, stuck, talks_nonsense
 from mcap.reader import make_reader
 from subprocesses import REPO, Cli, all_gone, children_of, quiet
-from viewers import Viewer, address_of, stuck, talks_nonsense
 
 from sil.launched import child_environment
 

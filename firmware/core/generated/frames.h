@@ -195,7 +195,7 @@ enum {
     EVENT_RESTARTED = 0x0004,             /* too far ahead: bumpless re-start; a: tick expected, b: tick that came */
     EVENT_WATCHDOG_ON = 0x0005,           /* link watchdog: torque is zero from here; a: tick, b: ticks without a SAMPLE */
     EVENT_WATCHDOG_OFF = 0x0006,          /* a SAMPLE came: the law commands again; a: tick, b: 0 */
-    EVENT_REFERENCE_RESTART = 0x0007,     /* reference model began anew; a: axis mask, bit 0 = x, b: 1 at the start */
+    EVENT_REFERENCE_RESTART = 0x0007,     /* reference model began anew; a: axes (1 x, 2 y, 3 x y, 4 z, 5 x z, 6 y z, 7 x y z), b: when (0 on the way, 1 at the start) */
     EVENT_ARITHMETIC_SATURATION = 0x0008, /* an operation of the law saturates from here (COMMAND's flag bit 3 rose); a: tick, b: 0 */
     EVENT_NAN = 0x0009,                   /* the law's torque was not a number; it is zero; a: axis 0, 1, 2, b: 0 */
     EVENT_READING_INVALID = 0x000A        /* a reading the law needs is invalid; a: needed mask, b: valid */

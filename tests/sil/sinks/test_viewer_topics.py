@@ -10,10 +10,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 import pytest
+from feeding import PERIOD_NS, Feed, configured, session, truth
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from scipy.spatial.transform import Rotation
 from synthetic import synthetic_journal
-from viewers import PERIOD_NS, Feed, configured, session, truth
 
 from protocol import events
 from protocol.frames import Telemetry
