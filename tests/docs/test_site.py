@@ -11,13 +11,12 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from site_pages import SitePage, addresses_in_styles, pages_of
 
-from tools.browser import Browser, program
+from tools.browser import Browser
 
 REPO = Path(__file__).resolve().parents[2]
 DOCS = REPO / "docs"
@@ -103,16 +102,6 @@ def test_a_broken_link_a_broken_anchor_and_a_missing_picture_break_the_build(tmp
 
 
 # -- in a browser --------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    path = program()
-    if path is None:
-        reason = "no Chromium: apt-get install chromium-headless-shell"
-        pytest.fail(reason) if os.environ.get("CI", "").lower() in ("1", "true") else pytest.skip(reason)
-    with Browser(path) as started:
-        yield started
 
 
 @pytest.mark.parametrize("name", KINDS)

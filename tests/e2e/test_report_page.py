@@ -7,8 +7,6 @@ Needs Debian's chromium-headless-shell (tools/install-system); without it skippe
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +16,7 @@ from sil import open_run
 from sil.report.page import report
 from sil.runner import run_scenario
 from sil.scenario import load_scenario
-from tools.browser import Browser, program
+from tools.browser import Browser
 
 DESKTOP, PHONE, SMALL_PHONE = (1400, 900), (390, 844), (320, 700)
 READY_MS = 1000.0  # what the page may take until it can be used, by the browser's own clock
@@ -27,16 +25,6 @@ POINTED = {  # angles (roll, pitch, yaw) in deg, and where x, y, z of the body p
     "pitch": ((0, 90, 0), (0, 0, -1), (0, 1, 0), (1, 0, 0)),
     "yaw": ((0, 0, 90), (0, 1, 0), (-1, 0, 0), (0, 0, 1)),
 }
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    path = program()
-    if path is None:
-        reason = "no Chromium: apt-get install chromium-headless-shell"
-        pytest.fail(reason) if os.environ.get("CI", "").lower() in ("1", "true") else pytest.skip(reason)
-    with Browser(path) as started:
-        yield started
 
 
 @pytest.fixture(scope="module")
